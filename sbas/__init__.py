@@ -1,0 +1,1 @@
+"""SBAS protection levels and integrity risk for railway signalling."""

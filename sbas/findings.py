@@ -1,0 +1,87 @@
+"""What is wrong with data: one type for readers, the input check and every analysis.
+
+Findings are kept in results, never only printed. The codes and their thresholds are
+documented in docs/formats.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+from sbas.exceptions import InputError
+
+Severity = Literal["error", "warning", "info"]
+
+CODES: dict[str, str] = {
+    "E01": "no truth for position errors",
+    "E03": "latitude and longitude look like radians",
+    "E04": "gaps in the recording",
+    "E05": "epochs with the same time",
+    "E07": "sentinel values mapped to missing",
+    "E08": "values in another unit than stated",
+    "E10": "epochs or records incomplete",
+    "E12": "positions far from the truth",
+    "E13": "protection level frozen, zero or negative",
+    "E14": "time goes backward",
+    "E15": "too few epochs",
+    "E16": "format not recognised",
+    "E17": "extension names another format than the content",
+    "E18": "line too long for text",
+    "E19": "text encoding repaired",
+    "E20": "decimal comma",
+    "E22": "date outside the age of SBAS",
+    "E23": "protection levels that DO-229 does not define",
+    "E24": "bytes that belong to no valid block",
+    "E25": "metadata missing, unreadable or contradicted",
+    "E26": "repair made on request",
+}
+"""Every finding code with its short title."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a reader of the figures must know about the data.
+
+    `severity`: an "error" makes analyses refuse until it is cured; a "warning" travels with
+    every result; "info" reports a counted conversion that the format itself defines.
+    """
+
+    code: str
+    severity: Severity
+    message: str
+    where: str = ""
+    evidence: str = ""
+    cure: str = ""
+
+    def __post_init__(self) -> None:
+        if self.code not in CODES:
+            raise ValueError(f"unknown finding code {self.code!r}; known are {', '.join(CODES)}")
+
+    @property
+    def title(self) -> str:
+        return CODES[self.code]
+
+    def to_dict(self) -> dict[str, str]:
+        return asdict(self)
+
+    def __str__(self) -> str:
+        parts = [f"{self.code} {self.severity}: {self.message}"]
+        parts += [f"  {k}: {v}" for k in ("where", "evidence", "cure") if (v := getattr(self, k))]
+        return "\n".join(parts)
+
+
+def refuse_on_errors(findings: Iterable[Finding]) -> None:
+    """Raise InputError with the first error among the findings, naming how many there are."""
+    errors = [f for f in findings if f.severity == "error"]
+    if not errors:
+        return
+    first = errors[0]
+    others = ", ".join(f.code for f in errors[1:])
+    raise InputError(
+        f"{first.code}: {first.message}",
+        where=first.where,
+        evidence=first.evidence + (f"; also found: {others}" if others else ""),
+        cure=first.cure,
+    )
