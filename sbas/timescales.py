@@ -110,7 +110,7 @@ def to_gps(time: ArrayLike, scale: TimeScale) -> NDArray[np.datetime64]:
         case "GPST" | "GST" | "QZSST":
             return times
         case "BDT":
-            return times + np.timedelta64(14, "s")
+            return (times.astype(np.int64) + 14 * NS_PER_S).astype("M8[ns]")
         case "UTC":
             return utc_to_gps(times)
         case "GLONASST":
