@@ -1,0 +1,156 @@
+"""Availability, continuity, and the times between losses and to recovery."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbas.estimate import Counted, Estimate
+from sbas.input_check import Gaps
+from sbas.integrity.counting import poisson_bounds
+from sbas.integrity.events import Runs
+from sbas.timescales import NS_PER_S
+
+Ints = NDArray[np.int64]
+
+NOT_INFERRED = (
+    "describes this recording; epochs are correlated, so no interval follows from their number"
+)
+
+
+@dataclass(frozen=True)
+class Availability:
+    """How often and how long the service was up.
+
+    `availability` counts gaps as down, `availability_excluding_gaps` leaves them out of the
+    denominator. `mttf` and `mttr` are Estimates in hours: mean up time to a loss and mean time
+    to recovery; with no loss seen, `mttf` is its own lower bound. `continuity_risk` is
+    P(service lost within the window | up now), again with gaps as losses and without.
+    """
+
+    availability: Estimate
+    availability_excluding_gaps: Estimate
+    up_hours: float
+    down_hours: float
+    gap_hours: float
+    losses: int
+    recoveries: int
+    mttf: Estimate
+    mttr: Estimate | None
+    continuity_risk: float
+    continuity_risk_excluding_gaps: float
+    continuity_window_epochs: int
+
+
+def continuity_risk(first: Ints, stop: Ints, rows: int, window: int) -> float:
+    """Probability to lose the service within a window, given that it is up now.
+
+    Parameters
+    ----------
+    first, stop : (k,) rows where down time begins and ends (exclusive), in order and disjoint;
+        equal for a gap, which has no rows.
+    rows : epochs in all.
+    window : W [epochs].
+
+    Returns
+    -------
+    For every loss min(W, length of the up run before it) epochs are at risk; the result is
+    their share among the up epochs, and 1 when there is none. Source: gLAB 6 `core/filter.c`
+    (definition only), the wording of Navipedia, EGNOS Performances.
+    """
+    previous = np.concatenate([[0], stop[:-1]])
+    up_before = first - previous
+    up = rows - int(np.sum(stop - first))
+    return float(np.minimum(up_before, window).sum()) / up if up else 1.0
+
+
+def availability(
+    down: Runs, gaps: Gaps, *, interval_ns: int, confidence: float, window_epochs: int = 15
+) -> Availability:
+    """Availability figures from the runs of down epochs and the gaps of a record.
+
+    Parameters
+    ----------
+    down : runs of epochs without service (no fix, level missing, or level >= alert limit).
+    gaps : gaps of the record.
+    interval_ns : sampling interval [ns].
+    confidence : one-sided, for the bounds of mttf and mttr.
+    window_epochs : W of the continuity risk.
+
+    Notes
+    -----
+    A loss is a transition from up to down. Down at the record's start is no loss; down at its
+    end is no recovery. MTTF = up time / losses, MTTR = down time / recoveries; their bounds
+    take losses and recoveries as Poisson events (methods: integrity statistics, 4.3).
+    """
+    hour_ns = 3600 * NS_PER_S
+    down_rows = int(np.sum(down.last - down.first + 1))
+    up_h = (down.rows - down_rows) * interval_ns / hour_ns
+    gap_h = float(gaps.missing_ns(interval_ns).sum()) / hour_ns
+    down_h = down_rows * interval_ns / hour_ns
+    first, stop = _fused(
+        np.concatenate([down.first, gaps.row]), np.concatenate([down.last + 1, gaps.row])
+    )
+    losses = int(np.sum(first > 0))
+    recoveries = int(np.sum(stop < down.rows))
+    loss_rate = poisson_bounds(losses, up_h, confidence) if up_h else None
+    if losses and loss_rate:
+        mttf = Estimate(
+            up_h / losses, 1 / _upper(loss_rate), None, confidence, "h",
+            Counted(losses, up_h, "losses of service"), "lower",
+        )  # fmt: skip
+    else:
+        bound = 1 / _upper(loss_rate) if loss_rate else 0.0
+        mttf = Estimate(
+            bound, bound, None, confidence, "h", Counted(0, up_h, "losses of service"), "lower",
+            ("no loss of service was seen: the value is the lower bound itself",),
+        )  # fmt: skip
+    mttr = None
+    if recoveries:
+        out_h = down_h + gap_h
+        lowest = poisson_bounds(recoveries, out_h, confidence, sided="lower").lower
+        mttr = Estimate(
+            out_h / recoveries, None, 1 / lowest if lowest else None, confidence, "h",
+            Counted(recoveries, out_h, "recoveries"), "upper",
+        )  # fmt: skip
+    rows_first, rows_stop = _fused(down.first, down.last + 1)
+    with_gaps, without = up_h + down_h + gap_h, up_h + down_h
+
+    def fraction(hours: float) -> Estimate:
+        share = up_h / hours if hours else 0.0
+        basis = Counted(down.rows - down_rows, hours, "available epochs")
+        return Estimate(share, None, None, None, "1", basis, "lower", (NOT_INFERRED,))
+
+    return Availability(
+        fraction(with_gaps),
+        fraction(without),
+        up_h,
+        down_h,
+        gap_h,
+        losses,
+        recoveries,
+        mttf,
+        mttr,
+        continuity_risk(first, stop, down.rows, window_epochs),
+        continuity_risk(rows_first, rows_stop, down.rows, window_epochs),
+        window_epochs,
+    )
+
+
+def _upper(rate: Estimate) -> float:
+    assert rate.upper is not None
+    return rate.upper
+
+
+def _fused(first: Ints, stop: Ints) -> tuple[Ints, Ints]:
+    """Down intervals in rows, sorted, with those that touch made one."""
+    order = np.lexsort((stop, first))
+    first, stop = first[order], stop[order]
+    if first.size == 0:
+        return first, stop
+    reach = np.maximum.accumulate(stop)
+    heads = np.concatenate([[0], np.flatnonzero(first[1:] > reach[:-1]) + 1])
+    tails = np.concatenate([heads[1:] - 1, [first.size - 1]])
+    return first[heads], reach[tails]

@@ -1,0 +1,93 @@
+"""What a rate of events rests on: demonstrated, modelled, claimed, never mixed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from sbas.estimate import Estimate, Quoted, Refusal
+from sbas.integrity.counting import poisson_bounds
+
+EventKind = Literal["hmi", "mi", "exceeds_al"]
+
+EVENT_KINDS: dict[EventKind, str] = {
+    "hmi": "HPE >= AL and HPL < AL for at least the time to alert",
+    "mi": "HPE >= HPL",
+    "exceeds_al": "HPE >= AL, whatever the HPL",
+}
+"""Kinds of events with their definitions; ties are unsafe."""
+
+FBM = "Filip, Bazant, Mocek 2010"
+
+NPA_CLAIM = Estimate(
+    1e-7, None, None, None, "per_h", Quoted(FBM, "2.1.2 and Fig. 2: NPA, 1e-7 in 1 hour"),
+    caveats=("an allocation of the service, not evidence of this receiver",),
+)  # fmt: skip
+"""Integrity risk allocated to the SBAS non-precision approach service, faulted and fault-free."""
+
+NOT_MODELLED = Refusal(
+    "no tail model is fitted in this version", "use the demonstrated bound, or record longer"
+)
+_NO_CLAIM = Refusal("no allocation covers errors regardless of the protection level")
+_LOWER_BOUND = Refusal(
+    "not demonstrated: errors against the recording's own median are only a lower bound",
+    "--truth LAT,LON,HEIGHT of the antenna",
+)
+_NO_EXPOSURE = Refusal(
+    "not demonstrated: no epoch has both what the event needs", "see the exposure's table"
+)
+
+
+@dataclass(frozen=True)
+class RateEvidence:
+    """The rate of one kind of event at one alert limit, in every evidence class."""
+
+    event: EventKind
+    alert_limit_m: float
+    events: int
+    hours: float
+    demonstrated: Estimate | Refusal
+    modelled: Estimate | Refusal
+    claimed: Estimate | Refusal
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "event": self.event,
+            "alert_limit_m": self.alert_limit_m,
+            "events": self.events,
+            "hours": self.hours,
+            "demonstrated": self.demonstrated.to_dict(),
+            "modelled": self.modelled.to_dict(),
+            "claimed": self.claimed.to_dict(),
+        }
+
+
+def rate_evidence(
+    event: EventKind,
+    alert_limit_m: float,
+    *,
+    events: int,
+    hours: float,
+    confidence: float,
+    lower_bound: bool,
+) -> RateEvidence:
+    """The evidence for a rate from counted events.
+
+    Parameters
+    ----------
+    event : kind of event.
+    alert_limit_m : alert limit [m].
+    events : declustered events.
+    hours : exposure: epochs at which such an event could be seen, times the interval [h].
+    confidence : of the one-sided upper bound.
+    lower_bound : True where errors were formed against the recording's own median.
+    """
+    demonstrated: Estimate | Refusal
+    if lower_bound:
+        demonstrated = _LOWER_BOUND
+    elif hours <= 0:
+        demonstrated = _NO_EXPOSURE
+    else:
+        demonstrated = poisson_bounds(events, hours, confidence)
+    claimed = _NO_CLAIM if event == "exceeds_al" else NPA_CLAIM
+    return RateEvidence(event, alert_limit_m, events, hours, demonstrated, NOT_MODELLED, claimed)

@@ -1,0 +1,229 @@
+"""Where the antenna really was: a surveyed point or a reference trajectory.
+
+Positions are geodetic on WGS 84 / GRS 80 with ellipsoidal heights. The truth's own uncertainty
+travels with it, since an error cannot be known better than the truth it is formed against.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+import pymap3d
+from numpy.typing import ArrayLike, NDArray
+
+from sbas.exceptions import InputError
+from sbas.timescales import NS_PER_S
+
+Floats = NDArray[np.float64]
+
+UNSTATED_FRAME_SIGMA_M = 1.0
+"""Allowed for a truth without a stated frame: ITRF and ETRS89 part by 2.5 cm a year since 1989."""
+
+
+class TruePosition(NamedTuple):
+    """True antenna positions at (n,) epochs; NaN where the truth does not reach."""
+
+    lat_deg: Floats
+    lon_deg: Floats
+    height_m: Floats
+    sigma_h_m: Floats
+    sigma_v_m: Floats
+
+
+@dataclass(frozen=True)
+class FixedPoint:
+    """A surveyed point.
+
+    Parameters
+    ----------
+    lat_deg, lon_deg : geodetic coordinates [deg].
+    height_m : height of the mark above the ellipsoid [m].
+    antenna_height_m : reference point of the receiver's positions above the mark [m].
+    sigma_h_m, sigma_v_m : 1-sigma of the survey [m], horizontal (any direction) and vertical.
+    frame : such as "ITRF2014 2010.0"; empty where nobody stated it, which adds 1 m.
+    lower_bound : True for a recording's own median: errors against it are too small.
+
+    Raises
+    ------
+    InputError : coordinates out of range, or a sigma that is negative.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    height_m: float
+    antenna_height_m: float = 0.0
+    sigma_h_m: float = 0.02
+    sigma_v_m: float = 0.03
+    frame: str = ""
+    lower_bound: bool = False
+
+    def __post_init__(self) -> None:
+        if not (abs(self.lat_deg) <= 90 and abs(self.lon_deg) <= 180):
+            raise InputError(
+                "the true position is not on Earth",
+                evidence=f"latitude {self.lat_deg}, longitude {self.lon_deg} [deg]",
+                cure="give --truth LAT,LON,HEIGHT in decimal degrees and metres",
+            )
+        for name in ("height_m", "antenna_height_m"):
+            if not abs(getattr(self, name)) < 20_000:
+                raise InputError(
+                    f"the truth's {name} is out of range",
+                    evidence=f"{getattr(self, name)} m",
+                    cure="give metres above the ellipsoid",
+                )
+        if not (0 <= self.sigma_h_m < 1e6 and 0 <= self.sigma_v_m < 1e6):
+            raise InputError("the uncertainty of the truth must be 0 m or more")
+
+    @property
+    def label(self) -> str:
+        if self.lower_bound:
+            return "median of the recording itself"
+        return f"fixed point {self.lat_deg:.8f}, {self.lon_deg:.8f}, {self.height_m:.3f} m"
+
+    def at(self, time: NDArray[np.datetime64]) -> TruePosition:
+        """The point at every one of (n,) epochs."""
+        extra = 0.0 if self.frame or self.lower_bound else UNSTATED_FRAME_SIGMA_M
+        values = (
+            self.lat_deg,
+            self.lon_deg,
+            self.height_m + self.antenna_height_m,
+            float(np.hypot(self.sigma_h_m, extra)),
+            float(np.hypot(self.sigma_v_m, extra)),
+        )
+        return TruePosition(*(np.broadcast_to(v, time.shape) for v in values))
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A reference trajectory, interpolated only where its own steps are short enough.
+
+    Parameters
+    ----------
+    table : index `time` (GPS time, increasing), columns lat_deg, lon_deg, height_m and
+        optionally sigma_h_m, sigma_v_m.
+    antenna_height_m : reference point of the receiver's positions above the trajectory's [m].
+    max_step_s : longest step of the trajectory that is interpolated [s]; elsewhere no error
+        is formed.
+    sigma_h_m, sigma_v_m : used where the table has none.
+    frame : as for FixedPoint.
+
+    Raises
+    ------
+    InputError : missing columns, times out of order, or fewer than two points.
+    """
+
+    table: pd.DataFrame
+    antenna_height_m: float = 0.0
+    max_step_s: float = 1.0
+    sigma_h_m: float = 0.02
+    sigma_v_m: float = 0.03
+    frame: str = ""
+
+    lower_bound = False
+
+    def __post_init__(self) -> None:
+        needed = {"lat_deg", "lon_deg", "height_m"}
+        if absent := needed - set(self.table.columns):
+            raise InputError(
+                "the trajectory lacks columns",
+                evidence=", ".join(sorted(absent)),
+                cure="give time, lat_deg, lon_deg and height_m (ellipsoidal)",
+            )
+        if self.table.index.dtype != np.dtype("M8[ns]") or len(self.table) < 2:
+            raise InputError(
+                "a trajectory has two or more points with GPS time",
+                evidence=f"{len(self.table)} points, times of dtype {self.table.index.dtype}",
+            )
+        steps = np.diff(self._time_ns)
+        if np.any(steps <= 0):
+            raise InputError(
+                "the trajectory's times do not increase",
+                where=f"after point {int(np.argmax(steps <= 0)) + 1}",
+                cure="sort it and keep one point a time",
+            )
+        if not self.max_step_s > 0:
+            raise InputError("max_step_s must be above 0 s", evidence=f"{self.max_step_s}")
+
+    @property
+    def _time_ns(self) -> NDArray[np.int64]:
+        return self.table.index.to_numpy().astype(np.int64)  # type: ignore[no-any-return]
+
+    @property
+    def label(self) -> str:
+        return f"trajectory of {len(self.table):,} points"
+
+    def at(self, time: NDArray[np.datetime64]) -> TruePosition:
+        """True positions at (n,) epochs: cubic in ECEF between points at most `max_step_s` apart.
+
+        The sigma at an interpolated epoch is the larger one of its two neighbours.
+        """
+        from scipy.interpolate import CubicSpline  # loaded only where a trajectory is used
+
+        knots = self._time_ns
+        epochs = np.asarray(time, "M8[ns]").astype(np.int64)
+        ecef = np.column_stack(
+            pymap3d.geodetic2ecef(*(self.table[c].to_numpy(float) for c in _POSITION))
+        )
+        result = np.full((epochs.size, 3), np.nan)
+        known = np.isfinite(ecef).all(axis=1)
+        steps = np.diff(knots)
+        joined = (steps <= self.max_step_s * NS_PER_S) & known[1:] & known[:-1]
+        segment_of_knot = np.concatenate([[0], np.cumsum(~joined)])
+        left = np.clip(np.searchsorted(knots, epochs, side="right") - 1, 0, knots.size - 1)
+        right = np.clip(np.searchsorted(knots, epochs, side="left"), 0, knots.size - 1)
+        inside = np.flatnonzero(
+            (segment_of_knot[left] == segment_of_knot[right])
+            & (epochs >= knots[0])
+            & (epochs <= knots[-1])
+            & known[left]
+        )
+        order = inside[np.argsort(segment_of_knot[left[inside]], kind="stable")]
+        segments, starts = np.unique(segment_of_knot[left[order]], return_index=True)
+        # One spline a segment: a polynomial must not be drawn across a step that is too long.
+        for segment, rows in zip(segments, np.split(order, starts[1:]), strict=False):
+            nodes = np.arange(*np.searchsorted(segment_of_knot, [segment, segment + 1]))
+            # Seconds from the segment's start: exact to nanoseconds for a year.
+            x = (knots[nodes] - knots[nodes[0]]) / NS_PER_S
+            at = (epochs[rows] - knots[nodes[0]]) / NS_PER_S
+            if nodes.size < 4:
+                result[rows] = np.column_stack([np.interp(at, x, ecef[nodes, i]) for i in range(3)])
+            else:
+                result[rows] = CubicSpline(x, ecef[nodes])(at)
+        lat, lon, height = pymap3d.ecef2geodetic(*result.T)
+        extra = 0.0 if self.frame else UNSTATED_FRAME_SIGMA_M
+        sigmas = []
+        for name in ("sigma_h_m", "sigma_v_m"):
+            fallback = np.full(knots.size, getattr(self, name))
+            own = self.table[name].to_numpy(float) if name in self.table else fallback
+            larger = np.maximum(own[left], own[right])
+            sigmas.append(np.where(np.isnan(result[:, 0]), np.nan, np.hypot(larger, extra)))
+        height = np.asarray(height) + self.antenna_height_m
+        return TruePosition(np.asarray(lat), np.asarray(lon), height, *sigmas)
+
+
+_POSITION = ("lat_deg", "lon_deg", "height_m")
+
+Truth = FixedPoint | Trajectory
+
+
+def east_north_up_m(
+    lat_deg: ArrayLike, lon_deg: ArrayLike, height_m: ArrayLike, truth: TruePosition
+) -> tuple[Floats, Floats, Floats]:
+    """Signed east, north and up of positions from the truth [m], in the truth's tangent plane.
+
+    Parameters
+    ----------
+    lat_deg, lon_deg, height_m : (n,) geodetic positions [deg, m]; where only the height is
+        missing, east and north are formed at the truth's height and up is NaN.
+    truth : (n,) true positions.
+    """
+    height = np.asarray(height_m, dtype=float)
+    flat = np.isnan(height)
+    used = np.where(flat, truth.height_m, height)
+    east, north, up = pymap3d.geodetic2enu(
+        lat_deg, lon_deg, used, truth.lat_deg, truth.lon_deg, truth.height_m
+    )
+    return np.asarray(east), np.asarray(north), np.where(flat, np.nan, up)
