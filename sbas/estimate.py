@@ -136,7 +136,7 @@ class Estimate:
         elif (bound := bounds.get(self.sided)) is not None:
             text += f" ({self.sided} bound {bound:.4g}{unit})"
         if self.confidence is not None:
-            text += f" at {100 * self.confidence:g} %"
+            text += f" at {100 * self.confidence:.12g} %"
         return f"{text}, {self.evidence}: {self.basis}"
 
     def _repr_html_(self) -> str:

@@ -12,10 +12,14 @@ class SbasError(Exception):
     where : file, line, column, epoch or argument.
     evidence : what was seen, so that the reader can judge it.
     cure : what to do next, as a command line or a line of Python where possible.
+    code : code of the finding behind it, if there is one (`sbas.findings.CODES`).
     """
 
-    def __init__(self, what: str, *, where: str = "", evidence: str = "", cure: str = "") -> None:
+    def __init__(
+        self, what: str, *, where: str = "", evidence: str = "", cure: str = "", code: str = ""
+    ) -> None:
         super().__init__(what)
+        self.code = code
         self.what = what
         self.where = where
         self.evidence = evidence
@@ -23,12 +27,18 @@ class SbasError(Exception):
 
     def __str__(self) -> str:
         parts = {"where": self.where, "evidence": self.evidence, "cure": self.cure}
-        lines = [self.what, *(f"  {key}: {text}" for key, text in parts.items() if text)]
+        what = f"{self.code}: {self.what}" if self.code else self.what
+        lines = [what, *(f"  {key}: {text}" for key, text in parts.items() if text)]
         return "\n".join(lines)
 
     def __reduce__(self) -> tuple[object, ...]:
-        state = {"where": self.where, "evidence": self.evidence, "cure": self.cure}
-        return (type(self), (self.what,), state)
+        return (_rebuild, (type(self), self.what, dict(vars(self))))
+
+
+def _rebuild(kind: type[SbasError], what: str, state: dict[str, str]) -> SbasError:
+    error = kind(what)
+    vars(error).update(state)
+    return error
 
 
 class InputError(SbasError, ValueError):

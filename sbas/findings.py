@@ -80,7 +80,8 @@ def refuse_on_errors(findings: Iterable[Finding]) -> None:
     first = errors[0]
     others = ", ".join(f.code for f in errors[1:])
     raise InputError(
-        f"{first.code}: {first.message}",
+        first.message,
+        code=first.code,
         where=first.where,
         evidence=first.evidence + (f"; also found: {others}" if others else ""),
         cure=first.cure,

@@ -339,18 +339,24 @@ def _against_point(facts: Survey, truth: FixedPoint) -> Iterable[Finding]:
         "-longitude": (lat, -lon),
     }
     distance = {
-        name: pymap3d.vincenty.vdist(*place, truth.lat_deg, truth.lon_deg)[0] / 1000
+        name: _chord_km(place, (truth.lat_deg, truth.lon_deg))
         for name, place in tries.items()
         if abs(place[0]) <= 90
     }
     limit_km = 1 if facts.static else 1000
     if distance["as given"] > limit_km:
-        listed = ", ".join(f"{name} {float(km):.4g} km" for name, km in distance.items())
+        listed = ", ".join(f"{name} {km:.4g} km" for name, km in distance.items())
         yield Finding(
             "E12", "error", "the recording's median position is far from the truth",
             evidence=f"distance {listed}",
             cure="correct --truth LAT,LON,HEIGHT (degrees, latitude first)",
         )  # fmt: skip
+
+
+def _chord_km(a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Straight distance between two points of the ellipsoid [km]."""
+    ends = (np.array(pymap3d.geodetic2ecef(*place, 0.0)) for place in (a, b))
+    return float(np.linalg.norm(np.subtract(*ends))) / 1000
 
 
 def _stamp(ns: int) -> str:

@@ -165,7 +165,7 @@ class RecordingMeta:
             plain["findings"] = tuple(Finding(**f) for f in plain["findings"])
             plain["pl"] = ProtectionLevelMeta(**plain["pl"])
             return cls(**plain)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise InputError(
                 "the recording's metadata cannot be read",
                 evidence=str(error),

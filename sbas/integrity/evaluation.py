@@ -138,7 +138,12 @@ class AlertLimitResult:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """What is drawn against the alert limit, and the densities of the pictures."""
+    """What is drawn against the alert limit, and the density of the Stanford diagram.
+
+    `available_fraction` (g,) at `level_grid_m`; event counts (c,) at `limits_m`, empty without
+    truth; `ratio_exceeded_fraction` (r,), share of judged epochs with HPE/HPL >= `ratio_grid`;
+    `stanford_counts` (rows HPL, columns HPE) in cells of `stanford_cell_m`, the last ones open.
+    """
 
     level_grid_m: NDArray[np.float64]
     available_fraction: NDArray[np.float64]
@@ -414,10 +419,9 @@ def _evaluation(
             )
         )
     lower_bound = truth is not None and truth.lower_bound
-    mi_runs = tally.mi.whole()
 
     def counted(kind: EventKind, limit: float, merge_s: float) -> Events:
-        runs = mi_runs if kind == "mi" else tally.at_limit(kind, limit)
+        runs = tally.mi.whole() if kind == "mi" else tally.at_limit(kind, limit)
         minimum = settings.time_to_alert_s if kind == "hmi" else 0.0
         return find_events(runs, interval_ns=interval_ns, merge_s=merge_s, minimum_s=minimum)
 
@@ -448,15 +452,16 @@ def _evaluation(
         rates = {kind: rate(kind, al) for kind in EVENT_KINDS}
         limits.append(AlertLimitResult(al, up, regions, events, rates))
 
-    limits_m = np.array(CURVE_LIMITS_M)
+    def along_curve(kind: EventKind) -> NDArray[np.int64]:
+        limits_m = CURVE_LIMITS_M if truth is not None else ()
+        return np.array([len(counted(kind, al, settings.merge_s)) for al in limits_m], np.int64)
+
     curves = Curves(
         level_grid_m=np.array(LEVEL_GRID_M),
         available_fraction=tally.levels_below() / max(tally.epochs, 1),
-        limits_m=limits_m,
-        hmi_events=np.array([len(counted("hmi", al, settings.merge_s)) for al in limits_m]),
-        exceeds_events=np.array(
-            [len(counted("exceeds_al", al, settings.merge_s)) for al in limits_m]
-        ),
+        limits_m=np.array(CURVE_LIMITS_M if truth is not None else ()),
+        hmi_events=along_curve("hmi"),
+        exceeds_events=along_curve("exceeds_al"),
         ratio_grid=tally.RATIO_GRID,
         ratio_exceeded_fraction=tally.ratio_exceeded(),
         stanford_cell_m=tally.stanford_cell_m,

@@ -1,0 +1,134 @@
+"""Truth and signed errors against closed forms on the ellipsoid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sbas.exceptions import InputError
+from sbas.integrity.position_error import position_errors
+from sbas.truth import FixedPoint, Trajectory
+
+A, F = 6_378_137.0, 1 / 298.257223563
+E2 = F * (2 - F)
+
+
+def table(lat: list[float], lon: list[float], height: list[float]) -> pd.DataFrame:
+    time = pd.date_range("2020-01-01", periods=len(lat), freq="1s", unit="ns", name="time")
+    return pd.DataFrame({"lat_deg": lat, "lon_deg": lon, "height_m": height}, index=time)
+
+
+def track(n: int, step_s: float = 1.0, speed: float = 40.0) -> pd.DataFrame:
+    """A circle at the equator: closed form of where an eastbound vehicle is."""
+    time_s = np.arange(n) * step_s
+    index = pd.DatetimeIndex(
+        np.datetime64("2020-01-01", "ns") + (time_s * 1e9).astype("m8[ns]"), name="time"
+    )
+    lon = np.degrees(speed * time_s / A)
+    return pd.DataFrame({"lat_deg": 0.0, "lon_deg": lon, "height_m": 0.0}, index=index)
+
+
+def test_a_step_north_is_the_meridian_radius_and_east_the_prime_vertical() -> None:
+    lat, d = 50.03, 1e-6
+    sin2 = np.sin(np.radians(lat)) ** 2
+    meridian = A * (1 - E2) / (1 - E2 * sin2) ** 1.5
+    parallel = A / np.sqrt(1 - E2 * sin2) * np.cos(np.radians(lat))
+    truth = FixedPoint(lat, 15.77, 289.4)
+    error = position_errors(
+        table([lat + d, lat, lat], [15.77, 15.77 + d, 15.77], [289.4, 289.4, 291.4]), truth
+    )
+    # 1e-6 deg is 0.11 m; the tangent plane departs from the arc by less than 1e-8 of it.
+    assert error["north_m"].iloc[0] == pytest.approx(np.radians(d) * (meridian + 289.4), rel=1e-6)
+    assert error["east_m"].iloc[1] == pytest.approx(
+        np.radians(d) * (parallel + 289.4 * np.cos(np.radians(lat))), rel=1e-6
+    )
+    assert error["up_m"].iloc[2] == pytest.approx(2.0, abs=1e-8)
+    assert error["hpe_m"].iloc[2] == pytest.approx(0.0, abs=1e-8)
+
+
+def test_the_antenna_stands_above_its_mark() -> None:
+    truth = FixedPoint(50.0, 15.0, 200.0, antenna_height_m=1.5)
+    error = position_errors(table([50.0], [15.0], [201.5]), truth)
+    assert error["up_m"].iloc[0] == pytest.approx(0.0, abs=1e-8)
+
+
+def test_a_missing_height_leaves_the_horizontal_error() -> None:
+    error = position_errors(table([50.0, np.nan], [15.0, 15.0], [np.nan, 200.0]),
+                            FixedPoint(50.0, 15.0, 200.0))  # fmt: skip
+    assert error["hpe_m"].iloc[0] == pytest.approx(0.0, abs=1e-8)
+    assert np.isnan(error["vpe_m"].iloc[0])
+    assert np.isnan(error["hpe_m"].iloc[1])
+
+
+def test_an_unstated_frame_allows_a_metre() -> None:
+    at = np.array(["2020-01-01"], "M8[ns]")
+    assert FixedPoint(50, 15, 200).at(at).sigma_h_m[0] == pytest.approx(np.hypot(0.02, 1.0))
+    assert FixedPoint(50, 15, 200, frame="ITRF2014").at(at).sigma_h_m[0] == 0.02
+
+
+def test_moving_truth_is_interpolated_to_the_closed_form() -> None:
+    whole = track(200)
+    late = whole.index + pd.Timedelta(milliseconds=370)
+    truth = Trajectory(whole, frame="ITRF2014").at(late[:-1].to_numpy())
+    lon = np.degrees(40.0 * (np.arange(199) + 0.37) / A)
+    # The cubic's error on a circle of Earth radius is far below a micrometre.
+    assert np.abs(np.radians(truth.lon_deg - lon) * A).max() < 1e-6
+    assert np.abs(truth.height_m).max() < 1e-4
+
+
+def test_no_truth_is_made_across_a_long_step_or_beyond_the_ends() -> None:
+    known = track(30).drop(track(30).index[10:13])
+    asked = pd.date_range("2019-12-31T23:59:58", periods=70, freq="500ms", unit="ns")
+    truth = Trajectory(known).at(asked.to_numpy())
+    have = asked[np.isfinite(truth.lat_deg)]
+    assert have.min() == known.index[0]
+    assert have.max() == known.index[-1]
+    assert not ((have > known.index[9]) & (have < known.index[10])).any()
+    assert np.isnan(truth.sigma_h_m[0])
+    slow = Trajectory(track(30, step_s=2.0), max_step_s=1.0).at(track(30).index.to_numpy())
+    assert np.isfinite(slow.lat_deg).sum() == 15
+
+
+def test_at_its_own_points_the_truth_is_itself() -> None:
+    known = track(7).assign(sigma_h_m=[1, 2, 3, 4, 5, 6, 7.0], sigma_v_m=0.5)
+    truth = Trajectory(known, frame="x").at(known.index.to_numpy()[::-1])
+    assert np.abs(truth.lon_deg[::-1] - known["lon_deg"]).max() < 1e-12
+    assert truth.sigma_h_m[::-1].tolist() == [1, 2, 3, 4, 5, 6, 7]
+    between = known.index.to_numpy()[:1] + np.timedelta64(500, "ms")
+    assert Trajectory(known, frame="x").at(between).sigma_h_m[0] == 2
+
+
+@given(st.lists(st.floats(0.1, 3.0), min_size=2, max_size=40), st.randoms())
+def test_the_order_of_epochs_does_not_matter(steps: list[float], random: object) -> None:
+    seconds = np.cumsum(steps)
+    base = track(len(seconds))
+    base.index = pd.DatetimeIndex(
+        np.datetime64("2020-01-01", "ns") + (seconds * 1e9).astype("m8[ns]"), name="time"
+    )
+    truth = Trajectory(base)
+    asked = np.datetime64("2020-01-01", "ns") + (
+        np.linspace(seconds[0] - 1, seconds[-1] + 1, 50) * 1e9
+    ).astype("m8[ns]")
+    forward, backward = truth.at(asked), truth.at(asked[::-1])
+    np.testing.assert_array_equal(forward.lon_deg, backward.lon_deg[::-1])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: FixedPoint(91, 0, 0),
+        lambda: FixedPoint(0, 0, 1e6),
+        lambda: FixedPoint(float("nan"), 0, 0),
+        lambda: FixedPoint(0, 0, 0, sigma_h_m=-1),
+        lambda: Trajectory(track(5).drop(columns="height_m")),
+        lambda: Trajectory(track(5).iloc[::-1]),
+        lambda: Trajectory(track(1)),
+        lambda: Trajectory(track(5), max_step_s=0),
+    ],
+)
+def test_impossible_truths_are_refused(wrong: object) -> None:
+    with pytest.raises(InputError):
+        wrong()  # type: ignore[operator]
