@@ -35,7 +35,7 @@ CODES: dict[str, str] = {
     "E23": "protection levels that DO-229 does not define",
     "E24": "bytes that belong to no valid block",
     "E25": "metadata missing, unreadable or contradicted",
-    "E26": "repair made on request",
+    "E26": "values converted, or repaired on request, and counted",
 }
 """Every finding code with its short title."""
 

@@ -7,6 +7,7 @@ condition, at a gap and at the record's end; where its true end was not seen it 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ class Stretch:
     time_ns: Ints
     max_step_ns: int
 
-    @property
+    @cached_property
     def gap_before(self) -> Bools:
         """(n,) True where the step to the epoch before is a gap; the first epoch is False."""
         return np.diff(self.time_ns, prepend=self.time_ns[:1]) > self.max_step_ns
