@@ -303,7 +303,8 @@ def _structure(facts: Survey) -> Iterable[Finding]:
         share = missing.sum() / ((facts.end_ns - facts.begin_ns) / NS_PER_S)
         yield Finding(
             "E04", "warning",
-            f"{len(facts.gaps)} gaps lose {missing.sum():.6g} s ({100 * share:.3g} % of the span)",
+            f"{_counted(len(facts.gaps), 'gap')}: lost {missing.sum():.6g} s, "
+            f"{100 * share:.3g} % of the span",
             evidence=f"longest {missing.max():.6g} s; step {facts.interval_ns / NS_PER_S:.6g} s",
             cure="nothing to do: availability is given with gaps as down and without them",
         )  # fmt: skip
@@ -357,6 +358,10 @@ def _chord_km(a: tuple[float, float], b: tuple[float, float]) -> float:
     """Straight distance between two points of the ellipsoid [km]."""
     ends = (np.array(pymap3d.geodetic2ecef(*place, 0.0)) for place in (a, b))
     return float(np.linalg.norm(np.subtract(*ends))) / 1000
+
+
+def _counted(n: int, what: str) -> str:
+    return f"{n:,} {what}" if n == 1 else f"{n:,} {what}s"
 
 
 def _stamp(ns: int) -> str:

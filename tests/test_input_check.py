@@ -94,7 +94,7 @@ def test_gaps_are_a_warning_with_their_size() -> None:
     r = recording(*np.zeros((2, 140)), np.full(140, 11.0), time_s=time)
     (gap,) = check(r).findings
     assert (gap.code, gap.severity) == ("E04", "warning")
-    assert "lose 60 s" in gap.message
+    assert "1 gap: lost 60 s" in gap.message
     assert "longest 60 s" in gap.evidence
 
 

@@ -4,284 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sbas.exceptions import InputError
 from sbas.findings import Finding, refuse_on_errors
 from sbas.input_check import CheckResult, accept, check
-from sbas.integrity.availability import Availability, availability
+from sbas.integrity.availability import availability
 from sbas.integrity.events import Events, find_events
 from sbas.integrity.rate_evidence import EVENT_KINDS, EventKind, RateEvidence, rate_evidence
+from sbas.integrity.results import (
+    AlertLimitResult,
+    Curves,
+    ErrorEllipse,
+    Evaluation,
+    EvaluationSettings,
+    Exposure,
+    Summary,
+)
 from sbas.integrity.stanford import REGIONS
-from sbas.integrity.tallies import CURVE_LIMITS_M, LEVEL_GRID_M, RecordTally
+from sbas.integrity.tallies import CURVE_LIMITS_M, LEVEL_GRID_M, LIMIT_KINDS, RecordTally
 from sbas.recording import EpochSource, RecordingMeta
-from sbas.streaming import DensityGrid, Distribution, ThinnedSeries
 from sbas.timescales import NS_PER_S
 from sbas.truth import FixedPoint, Truth
 
 Progress = Callable[[int, int], None]
-
-
-@dataclass(frozen=True)
-class EvaluationSettings:
-    """What an evaluation is asked; every default is echoed in its result.
-
-    Parameters
-    ----------
-    alert_limits_m : horizontal alert limits [m].
-    time_to_alert_s : an HMI event lasts at least this [s]; 10 s is NPA's, 6 s PA's
-        (Navipedia, EGNOS Performances).
-    merge_s : events closer than this are one for a rate [s]; without a measured decorrelation
-        time the floor of the convention max(tau/2, 60 s), which counts rather too many.
-    reset_s : merge time of the event list: what the user system needs to be reset [s].
-    confidence : of every one-sided bound.
-    accept : finding codes that the user accepts.
-    """
-
-    alert_limits_m: tuple[float, ...] = (50.0, 25.0, 20.0)
-    time_to_alert_s: float = 10.0
-    merge_s: float = 60.0
-    reset_s: float = 0.0
-    confidence: float = 0.95
-    accept: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        limits = self.alert_limits_m
-        if not limits or not all(0 < al < math.inf for al in limits):
-            raise InputError(
-                "alert limits are metres above 0",
-                evidence=f"got {limits}",
-                cure="--alert-limit 50,25,20",
-            )
-        if len(set(limits)) < len(limits):
-            raise InputError("an alert limit is given twice", evidence=f"got {limits}")
-        for name in ("time_to_alert_s", "merge_s", "reset_s"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise InputError(f"{name} must be 0 s or more", evidence=f"{getattr(self, name)}")
-        if not 0 < self.confidence < 1:
-            raise InputError(
-                "the confidence must lie between 0 and 1",
-                evidence=f"got {self.confidence}",
-                cure="--confidence 0.95",
-            )
-
-
-@dataclass(frozen=True)
-class Summary:
-    """Order statistics of a quantity over its known epochs [m].
-
-    `resolution_m` bounds the error of median and 95 % value: 0 while they are exact.
-    """
-
-    min: float
-    median: float
-    p95: float
-    max: float
-    mean: float
-    epochs: int
-    resolution_m: float
-
-    @classmethod
-    def of(cls, seen: Distribution) -> Summary | None:
-        """None when no value has come."""
-        if seen.count == 0:
-            return None
-        median, p95 = seen.quantile(0.5), seen.quantile(0.95)
-        return cls(seen.min, median, p95, seen.max, seen.mean, seen.count, seen.error)
-
-
-@dataclass(frozen=True)
-class ErrorEllipse:
-    """First and second moments of the horizontal error: mean [m] and covariance [m2]."""
-
-    mean_e_m: float
-    mean_n_m: float
-    var_e_m2: float
-    var_n_m2: float
-    cov_en_m2: float
-
-    def axes(self) -> tuple[float, float, float]:
-        """1-sigma major and minor semi-axis [m] and the major one's azimuth from north [deg]."""
-        matrix = [[self.var_e_m2, self.cov_en_m2], [self.cov_en_m2, self.var_n_m2]]
-        values, vectors = np.linalg.eigh(np.array(matrix))
-        minor, major = np.sqrt(np.maximum(values, 0.0))
-        azimuth = float(np.degrees(np.arctan2(vectors[0, 1], vectors[1, 1]))) % 180
-        return float(major), float(minor), azimuth
-
-
-@dataclass(frozen=True)
-class Exposure:
-    """The hours that figures rest on, and why the others do not count [h]."""
-
-    recorded_hours: float
-    gap_hours: float
-    without_error_hours: float
-    without_level_hours: float
-    judged_hours: float
-    error_hours: float
-
-
-@dataclass(frozen=True)
-class AlertLimitResult:
-    """Everything that depends on one alert limit."""
-
-    alert_limit_m: float
-    availability: Availability
-    regions: dict[str, int] | None
-    events: dict[EventKind, Events]
-    rates: dict[EventKind, RateEvidence]
-
-
-@dataclass(frozen=True, eq=False)
-class Curves:
-    """What is drawn against the alert limit, and the density of the Stanford diagram.
-
-    `available_fraction` (g,) at `level_grid_m`; event counts (c,) at `limits_m`, empty without
-    truth; `ratio_exceeded_fraction` (r,), share of judged epochs with HPE/HPL >= `ratio_grid`;
-    `stanford_counts` (rows HPL, columns HPE) in cells of `stanford_cell_m`, the last ones open.
-    """
-
-    level_grid_m: NDArray[np.float64]
-    available_fraction: NDArray[np.float64]
-    limits_m: NDArray[np.float64]
-    hmi_events: NDArray[np.int64]
-    exceeds_events: NDArray[np.int64]
-    ratio_grid: NDArray[np.float64]
-    ratio_exceeded_fraction: NDArray[np.float64]
-    stanford_cell_m: float
-    stanford_counts: NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Evaluation:
-    """The answer of `evaluate`."""
-
-    meta: RecordingMeta
-    settings: EvaluationSettings
-    input: CheckResult
-    findings: tuple[Finding, ...]
-    truth: Truth | None
-    epochs: int
-    hours: float
-    exposure: Exposure
-    hpe_m: Summary | None
-    vpe_m: Summary | None
-    hpl_m: Summary | None
-    vpl_m: Summary | None
-    truth_sigma_h_m: float | None
-    ellipse: ErrorEllipse | None
-    modes: dict[str, int]
-    mi_epochs: int | None
-    alert_limits: tuple[AlertLimitResult, ...]
-    curves: Curves
-    strips: ThinnedSeries
-    scatter: DensityGrid
-
-    @property
-    def errors_are_lower_bound(self) -> bool:
-        return self.truth is not None and self.truth.lower_bound
-
-    def at(self, alert_limit_m: float) -> AlertLimitResult:
-        """The result at one of the alert limits."""
-        for result in self.alert_limits:
-            if result.alert_limit_m == alert_limit_m:
-                return result
-        raise KeyError(alert_limit_m)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        survey = self.input.survey
-        return {
-            "epochs": self.epochs,
-            "hours": self.hours,
-            "begin_gpst": _stamp(survey.begin_ns),
-            "end_gpst": _stamp(survey.end_ns),
-            "interval_s": survey.interval_ns / NS_PER_S,
-            "truth": None if self.truth is None else self.truth.label,
-            "errors_are_lower_bound": self.errors_are_lower_bound,
-            "truth_sigma_h_m": self.truth_sigma_h_m,
-            **{name: _plain(getattr(self, name)) for name in ("hpe_m", "vpe_m", "hpl_m", "vpl_m")},
-            "mi_epochs": self.mi_epochs,
-            "modes": self.modes,
-            "exposure": dict(vars(self.exposure)),
-            "settings": dict(vars(self.settings)),
-            "alert_limits": {f"{r.alert_limit_m:g}": _limit_dict(r) for r in self.alert_limits},
-            "findings": [f.to_dict() for f in self.findings],
-            "sources": [dict(vars(s)) for s in self.meta.sources],
-        }
-
-    def summary(self) -> Any:
-        """A DataFrame of the rates: a row an event kind and alert limit."""
-        import pandas as pd
-
-        rows = [
-            {
-                "alert_limit_m": limit.alert_limit_m,
-                "event": kind,
-                "events": rate.events,
-                "hours": rate.hours,
-                "upper_per_h": getattr(rate.demonstrated, "upper", None),
-                "demonstrated": str(rate.demonstrated),
-                "availability": limit.availability.availability.value,
-            }
-            for limit in self.alert_limits
-            for kind, rate in limit.rates.items()
-        ]
-        return pd.DataFrame(rows).set_index(["alert_limit_m", "event"])
-
-    def __str__(self) -> str:
-        lines = [f"{self.epochs:,} epochs, {self.hours:.6g} h recorded"]
-        for name, label in (("hpe_m", "HPE"), ("hpl_m", "HPL")):
-            seen: Summary | None = getattr(self, name)
-            if seen:
-                lines.append(
-                    f"{label} min/median/95 %/max {seen.min:.3f}/{seen.median:.3f}/"
-                    f"{seen.p95:.3f}/{seen.max:.3f} m over {seen.epochs:,} epochs"
-                )
-        return "\n".join(lines)
-
-
-def _plain(summary: Summary | None) -> dict[str, Any] | None:
-    return None if summary is None else dict(vars(summary))
-
-
-def _limit_dict(result: AlertLimitResult) -> dict[str, Any]:
-    up = result.availability
-    return {
-        "alert_limit_m": result.alert_limit_m,
-        "availability": up.availability.value,
-        "availability_excluding_gaps": up.availability_excluding_gaps.value,
-        "availability_estimate": up.availability.to_dict(),
-        "mttf": up.mttf.to_dict(),
-        "mttr": None if up.mttr is None else up.mttr.to_dict(),
-        "losses": up.losses,
-        "continuity_risk": up.continuity_risk,
-        "continuity_risk_excluding_gaps": up.continuity_risk_excluding_gaps,
-        "continuity_window_epochs": up.continuity_window_epochs,
-        "regions": result.regions,
-        "events": {
-            kind: [
-                {
-                    "start_gpst": _stamp(int(start)),
-                    "duration_s": float(duration),
-                    "censored": bool(cut),
-                }
-                for start, duration, cut in zip(
-                    events.start_ns, events.duration_s, events.censored, strict=True
-                )
-            ]
-            for kind, events in result.events.items()
-        },
-        "rates": {kind: rate.to_dict() for kind, rate in result.rates.items()},
-    }
-
-
-def _stamp(ns: int) -> str:
-    return str(np.datetime64(ns, "ns"))
 
 
 def evaluate(
@@ -452,16 +198,13 @@ def _evaluation(
         rates = {kind: rate(kind, al) for kind in EVENT_KINDS}
         limits.append(AlertLimitResult(al, up, regions, events, rates))
 
-    def along_curve(kind: EventKind) -> NDArray[np.int64]:
-        limits_m = CURVE_LIMITS_M if truth is not None else ()
-        return np.array([len(counted(kind, al, settings.merge_s)) for al in limits_m], np.int64)
+    def along_curve(kind: EventKind) -> tuple[RateEvidence, ...]:
+        return () if truth is None else tuple(rate(kind, al) for al in CURVE_LIMITS_M)
 
     curves = Curves(
         level_grid_m=np.array(LEVEL_GRID_M),
         available_fraction=tally.levels_below() / max(tally.epochs, 1),
-        limits_m=np.array(CURVE_LIMITS_M if truth is not None else ()),
-        hmi_events=along_curve("hmi"),
-        exceeds_events=along_curve("exceeds_al"),
+        rates={kind: along_curve(kind) for kind in LIMIT_KINDS},
         ratio_grid=tally.RATIO_GRID,
         ratio_exceeded_fraction=tally.ratio_exceeded(),
         stanford_cell_m=tally.stanford_cell_m,

@@ -27,6 +27,9 @@ CURVE_LIMITS_M = (
 )  # fmt: skip
 """Alert limits of the curve rate against alert limit [m]; 556 m is aviation's NPA limit."""
 
+LIMIT_KINDS: tuple[EventKind, ...] = ("hmi", "exceeds_al")
+"""Kinds of events that depend on the alert limit."""
+
 LEVEL_GRID_M = tuple(np.concatenate([np.arange(1, 201) / 2, np.arange(110, 610, 10)]).tolist())
 """Alert limits of the curve availability against alert limit [m]."""
 
@@ -84,8 +87,7 @@ class RecordTally:
         self.down = {al: RunCollector() for al in alert_limits_m}
         self.mi = RunCollector()
         self._limits = tuple(sorted({*alert_limits_m, *CURVE_LIMITS_M}))
-        kinds: tuple[EventKind, ...] = ("hmi", "exceeds_al")
-        self._over = {(kind, al): RunCollector() for kind in kinds for al in self._limits}
+        self._over = {(kind, al): RunCollector() for kind in LIMIT_KINDS for al in self._limits}
         self._level_counts = np.zeros(len(LEVEL_GRID_M) + 1, np.int64)
         self._ratio_counts = np.zeros(self.RATIO_GRID.size + 1, np.int64)
         self._sums = np.zeros(5)
@@ -111,11 +113,11 @@ class RecordTally:
         # A missing mode has code -1, which the modulus turns into the last name, unknown.
         for name, count in zip(self.modes, np.bincount(codes % len(self.modes)), strict=False):
             self.modes[name] += int(count)
+        fix = np.isfinite(batch["lat_deg"].to_numpy()) & np.isfinite(batch["lon_deg"].to_numpy())
         self._level_counts += np.bincount(
-            np.searchsorted(LEVEL_GRID_M, hpl[np.isfinite(hpl)], side="right"),
+            np.searchsorted(LEVEL_GRID_M, hpl[fix & np.isfinite(hpl)], side="right"),
             minlength=self._level_counts.size,
         )
-        fix = np.isfinite(batch["lat_deg"].to_numpy()) & np.isfinite(batch["lon_deg"].to_numpy())
         for al in self.alert_limits_m:
             # Written so that a missing level or fix is down.
             self.down[al].add(np.flatnonzero(~(fix & (hpl < al))), stretch)
@@ -198,7 +200,7 @@ class RecordTally:
         return self._over[kind, alert_limit_m].whole()
 
     def levels_below(self) -> Ints:
-        """(g,) epochs with HPL below each limit of LEVEL_GRID_M."""
+        """(g,) epochs with a fix and HPL below each limit of LEVEL_GRID_M."""
         return np.cumsum(self._level_counts)[:-1]
 
     def ratio_exceeded(self) -> Floats:

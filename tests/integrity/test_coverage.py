@@ -29,7 +29,7 @@ def test_the_upper_bound_covers_in_1000_records_with_injected_failures() -> None
         uppers.append(found.demonstrated.upper)
         events.append(found.events)
     upper = np.array(uppers, float)
-    # Three failures are expected in a record; the mean of 1000 counts has a standard error of 0.055.
+    # Three failures are expected; the mean of 1000 counts has a standard error of 0.055.
     assert abs(np.mean(events) - 3.0) < 0.25
     assert np.mean(upper >= RATE_PER_H) >= 0.935
     # A bound that covers by being endless would be worthless: for three events it is 2.6 times.

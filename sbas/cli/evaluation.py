@@ -1,0 +1,213 @@
+"""Verbs that judge a recording: evaluate and rate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.table import Table
+
+from sbas.cli import inputs, output
+from sbas.estimate import Estimate, Refusal
+from sbas.exceptions import InputError
+from sbas.integrity.evaluation import evaluate
+from sbas.integrity.failure_rates import FailureRate, failure_rate
+from sbas.integrity.rate_evidence import EVENT_KINDS
+from sbas.integrity.results import Evaluation, EvaluationSettings
+
+_DEFAULTS = EvaluationSettings()
+
+TimeToAlert = Annotated[
+    float, typer.Option("--time-to-alert", help="An HMI event lasts at least this [s].")
+]
+Merge = Annotated[float, typer.Option("--merge", help="Events closer than this are one [s].")]
+Reset = Annotated[
+    float, typer.Option("--reset", help="Merge time of the event list: the user's reset [s].")
+]
+Confidence = Annotated[float, typer.Option(help="Confidence of one-sided bounds.")]
+
+
+def register(app: typer.Typer) -> None:
+    app.command("evaluate")(evaluate_files)
+    app.command("rate")(rate)
+
+
+def evaluate_files(
+    files: inputs.Files,
+    truth: inputs.TruthText = None,
+    alert_limit: Annotated[str, typer.Option(help="Horizontal alert limits [m].")] = "50,25,20",
+    report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
+    frame: inputs.Frame = "",
+    antenna_height: inputs.AntennaHeight = 0.0,
+    truth_max_step: inputs.MaxStep = 1.0,
+    time_to_alert: TimeToAlert = _DEFAULTS.time_to_alert_s,
+    merge: Merge = _DEFAULTS.merge_s,
+    reset: Reset = _DEFAULTS.reset_s,
+    confidence: Confidence = _DEFAULTS.confidence,
+    accept: inputs.Accept = None,
+    format_name: inputs.FormatName = None,
+    time_scale: inputs.TimeScaleName = None,
+    mode_map: inputs.ModeMap = None,
+    geoid: inputs.Geoid = None,
+    sort: inputs.Sort = False,
+    duplicates: inputs.Duplicates = None,
+    pl_zero: inputs.PlZero = None,
+    json: output.Json = False,
+    quiet: output.Quiet = False,
+) -> None:
+    """Errors, Stanford regions, events, availability and rates.
+
+    Example:  sbas evaluate roof.sbf --truth 50.03,15.77,289.4 --report roof.html
+    """
+    limits = inputs.alert_limits(alert_limit)
+    known = inputs.open_truth(
+        truth, frame=frame, antenna_height_m=antenna_height, max_step_s=truth_max_step
+    )
+    source = inputs.open_source(
+        files,
+        format_name=format_name,
+        time_scale=time_scale,
+        mode_map=mode_map,
+        geoid=geoid,
+        sort=sort,
+        duplicates=duplicates,
+        pl_zero=pl_zero,
+        quiet=quiet,
+    )
+    with output.progress("evaluating", quiet) as callback:
+        result = evaluate(
+            source,
+            truth=known,
+            alert_limits_m=limits,
+            time_to_alert_s=time_to_alert,
+            merge_s=merge,
+            reset_s=reset,
+            confidence=confidence,
+            accept_findings=accept or (),
+            progress=callback,
+        )
+    page = None
+    if report is not None:
+        from sbas.reporting import report as write_report  # drawing is loaded only where used
+
+        page = write_report(result, report)
+    if json:
+        output.print_json({**result.to_dict(), "report": None if page is None else str(page)})
+        return
+    print_verdict(result)
+    if page is not None:
+        print(f"\nreport  {page}")
+
+
+def print_verdict(result: Evaluation) -> None:
+    """The short answer: sizes of errors and levels, a row an alert limit, the findings."""
+    print(result)
+    if result.errors_are_lower_bound:
+        print("errors are a lower bound: they are formed against the recording's own median")
+    table = Table(box=box.SIMPLE, pad_edge=False)
+    heads = ("AL [m]", "available", "incl. gaps", "HMI epochs", "HMI events",
+             f"HMI rate, upper {100 * result.settings.confidence:.12g} % [1/h]")  # fmt: skip
+    for head in heads:
+        table.add_column(head, justify="right")
+    for limit in result.alert_limits:
+        up, rate = limit.availability, limit.rates.get("hmi")
+        table.add_row(
+            f"{limit.alert_limit_m:g}",
+            f"{up.availability_excluding_gaps.value:.6f}",
+            f"{up.availability.value:.6f}",
+            "-" if limit.regions is None else f"{limit.regions['hmi']:,}",
+            "-" if rate is None else str(rate.events),
+            "-" if rate is None else _upper(rate.demonstrated),
+        )
+    output.console().print(table)
+    output.print_findings(result.findings)
+
+
+def _upper(figure: Estimate | Refusal) -> str:
+    if isinstance(figure, Refusal):
+        return "not demonstrated"
+    return "-" if figure.upper is None else f"{figure.upper:.4g}"
+
+
+def rate(
+    files: inputs.Files,
+    alert_limit: Annotated[float, typer.Option(help="Horizontal alert limit [m].")],
+    truth: inputs.TruthText = None,
+    confidence: Confidence = _DEFAULTS.confidence,
+    event: Annotated[
+        str, typer.Option(help="; ".join(f"{k}: {v}" for k, v in EVENT_KINDS.items()))
+    ] = "hmi",
+    target_per_h: Annotated[
+        float | None, typer.Option("--target-per-h", help="Rate to be demonstrated [1/h].")
+    ] = None,
+    frame: inputs.Frame = "",
+    antenna_height: inputs.AntennaHeight = 0.0,
+    truth_max_step: inputs.MaxStep = 1.0,
+    time_to_alert: TimeToAlert = _DEFAULTS.time_to_alert_s,
+    merge: Merge = _DEFAULTS.merge_s,
+    accept: inputs.Accept = None,
+    format_name: inputs.FormatName = None,
+    time_scale: inputs.TimeScaleName = None,
+    mode_map: inputs.ModeMap = None,
+    geoid: inputs.Geoid = None,
+    sort: inputs.Sort = False,
+    duplicates: inputs.Duplicates = None,
+    pl_zero: inputs.PlZero = None,
+    json: output.Json = False,
+    quiet: output.Quiet = False,
+) -> None:
+    """Which failure rate per hour can I claim, and is the target demonstrated (else exit 1)?
+
+    Example:  sbas rate roof.sbf --truth 50.03,15.77,289.4 --alert-limit 25 --target-per-h 1e-7
+    """
+    if event not in EVENT_KINDS:
+        raise InputError(
+            f"unknown event {event!r}", cure=f"--event with one of {', '.join(EVENT_KINDS)}"
+        )
+    known = inputs.open_truth(
+        truth, frame=frame, antenna_height_m=antenna_height, max_step_s=truth_max_step
+    )
+    source = inputs.open_source(
+        files,
+        format_name=format_name,
+        time_scale=time_scale,
+        mode_map=mode_map,
+        geoid=geoid,
+        sort=sort,
+        duplicates=duplicates,
+        pl_zero=pl_zero,
+        quiet=quiet,
+    )
+    with output.progress("evaluating", quiet) as callback:
+        result = failure_rate(
+            source,
+            truth=known,
+            alert_limit_m=alert_limit,
+            confidence=confidence,
+            event=event,
+            target_per_h=target_per_h,
+            time_to_alert_s=time_to_alert,
+            merge_s=merge,
+            accept_findings=accept or (),
+            progress=callback,
+        )
+    if json:
+        output.print_json(result.to_dict())
+    else:
+        _print_rate(result)
+    if not result.demonstrated:
+        raise typer.Exit(1)
+
+
+def _print_rate(result: FailureRate) -> None:
+    evidence = result.evidence
+    print(f"{evidence.event}: {EVENT_KINDS[evidence.event]}; AL {evidence.alert_limit_m:g} m")
+    print(f"{evidence.events} events in {evidence.hours:.6g} h of exposure")
+    for name in ("demonstrated", "modelled", "claimed"):
+        print(f"{name:13s} {getattr(evidence, name)}")
+    print(f"SIL           {result.sil}")
+    if result.target is not None:
+        print(f"target        {result.target}")
+    output.print_findings(result.findings)

@@ -1,0 +1,182 @@
+"""Verbs that make and look at recordings: check, simulate, demo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from sbas.cli import inputs, output
+from sbas.cli.evaluation import print_verdict
+from sbas.exceptions import InputError
+from sbas.findings import Finding
+from sbas.input_check import CheckResult, check
+from sbas.integrity.evaluation import evaluate
+from sbas.laboratory import (
+    LaboratorySettings,
+    bundled_settings,
+    load_settings,
+    simulate_pieces,
+)
+from sbas.logs.registry import formats, read
+from sbas.recording import Recording
+from sbas.timescales import NS_PER_S
+from sbas.truth import FixedPoint
+
+
+def register(app: typer.Typer) -> None:
+    app.command("demo")(demo)
+    app.command("simulate")(simulate)
+    app.command("check")(check_files)
+
+
+def check_files(
+    files: inputs.Files,
+    truth: inputs.TruthText = None,
+    format_name: inputs.FormatName = None,
+    time_scale: inputs.TimeScaleName = None,
+    mode_map: inputs.ModeMap = None,
+    geoid: inputs.Geoid = None,
+    sort: inputs.Sort = False,
+    duplicates: inputs.Duplicates = None,
+    pl_zero: inputs.PlZero = None,
+    json: output.Json = False,
+    quiet: output.Quiet = False,
+) -> None:
+    """Can I trust this input? What is wrong with it, where, and the cure.
+
+    Example:  sbas check roof.sbf --json
+    """
+    try:
+        source = inputs.open_source(
+            files,
+            format_name=format_name,
+            time_scale=time_scale,
+            mode_map=mode_map,
+            geoid=geoid,
+            sort=sort,
+            duplicates=duplicates,
+            pl_zero=pl_zero,
+            quiet=quiet,
+        )
+    except InputError as error:
+        # What cannot be read is the plainest finding of all; programs get it as one.
+        if json and error.code:
+            finding = Finding(
+                error.code, "error", error.what, error.where, error.evidence, error.cure
+            )
+            output.print_json({"epochs": 0, "format": None, "findings": [finding.to_dict()]})
+        raise
+    result = check(source, truth=inputs.open_truth(truth))
+    if json:
+        output.print_json(result.to_dict())
+    else:
+        _print_check(result)
+    if not result.usable:
+        raise typer.Exit(2)
+
+
+def _print_check(result: CheckResult) -> None:
+    survey = result.survey
+    print(f"{result.epochs:,} epochs read as {result.format}")
+    if survey.epochs > 1:
+        span = np.array([survey.begin_ns, survey.end_ns]).astype("M8[ns]").astype("M8[s]")
+        print(f"{span[0]} to {span[1]} GPST, every {survey.interval_ns / NS_PER_S:g} s")
+        print(f"{survey.levels:,} epochs with HPL, {survey.positions:,} with position")
+    output.print_findings(result.findings)
+    if not result.findings:
+        print("no finding")
+    print("usable" if result.usable else "not usable as it is: see the cures above")
+
+
+def simulate(
+    out: Annotated[Path, typer.Option(help="File to write: .sbf or .parquet.")],
+    hours: Annotated[float | None, typer.Option(help="Length of the recording [h].")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of all randomness.")] = None,
+    settings: Annotated[
+        Path | None, typer.Option(help="TOML settings; without, those of the demo.")
+    ] = None,
+    failure_rate_per_h: Annotated[
+        float | None, typer.Option(help="Rate of injected dangerous failures [1/h].")
+    ] = None,
+    json: output.Json = False,
+    quiet: output.Quiet = False,
+) -> None:
+    """Make a laboratory recording with known errors.
+
+    Example:  sbas simulate --hours 24 --seed 7 --out lab.sbf
+    """
+    chosen = bundled_settings() if settings is None else load_settings(settings)
+    if hours is not None:
+        chosen = replace(chosen, hours=hours)
+    if seed is not None:
+        chosen = replace(chosen, seed=seed)
+    if failure_rate_per_h is not None:
+        chosen = replace(chosen, failure_rate_per_h=failure_rate_per_h)
+    epochs = write_simulation(chosen, out, quiet=quiet)
+    truth = f"{chosen.lat_deg},{chosen.lon_deg},{chosen.height_m}"
+    if json:
+        output.print_json({"epochs": epochs, "file": str(out), "truth": truth})
+    else:
+        print(f"{epochs:,} epochs in {out}; evaluate them with\n"
+              f"  sbas evaluate {out} --truth {truth}")  # fmt: skip
+
+
+def write_simulation(settings: LaboratorySettings, out: Path, *, quiet: bool) -> int:
+    """Write a simulated recording piece by piece; the number of epochs written."""
+    writers = {ext: f.write for f in formats() if f.write for ext in f.extensions}
+    write = writers.get(out.suffix.lower())
+    if write is None:
+        raise InputError(
+            f"cannot write {out.name!r}",
+            cure=f"give --out with one of {', '.join(sorted(writers))}",
+        )
+    out.parent.mkdir(parents=True, exist_ok=True)
+    epochs = 0
+    with output.progress(f"simulating {out.name}", quiet) as callback:
+
+        def counted() -> Iterator[Recording]:
+            nonlocal epochs
+            for piece in simulate_pieces(settings):
+                epochs += len(piece)
+                yield piece
+                if callback is not None:
+                    callback(epochs, settings.epochs)
+
+        write(counted(), out)
+    return epochs
+
+
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for the recording and its report.")] = Path(
+        "sbas-demo"
+    ),
+    json: output.Json = False,
+    quiet: output.Quiet = False,
+) -> None:
+    """Show me the whole chain on the bundled 3.5-day laboratory recording.
+
+    Example:  sbas demo --out demo
+    """
+    from sbas.reporting import report  # drawing is loaded only where it is used
+
+    settings = bundled_settings()
+    recording = out / "laboratory_2009.sbf"
+    write_simulation(settings, recording, quiet=quiet)
+    with output.progress(f"reading {recording.name}", quiet) as callback:
+        source = read(recording, progress=callback)
+    truth = FixedPoint(
+        settings.lat_deg, settings.lon_deg, settings.height_m, frame="WGS 84, simulated"
+    )
+    with output.progress("evaluating", quiet) as callback:
+        evaluation = evaluate(source, truth=truth, progress=callback)
+    page = report(evaluation, out / "report.html")
+    if json:
+        output.print_json({"report": str(page), "recording": str(recording)})
+        return
+    print_verdict(evaluation)
+    print(f"\nrecording  {recording}\nreport     {page}  (open it in a browser)")

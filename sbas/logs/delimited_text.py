@@ -1,0 +1,464 @@
+"""Delimited text (CSV): an alias map, units in headers, times as stamps or week and seconds.
+
+Delimiters are `,` `;` tab and blanks; comment lines begin with `#` or `%`. What was taken for
+what is in the recording's options under `columns`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from sbas.exceptions import InputError
+from sbas.findings import Finding
+from sbas.logs.column_map import (
+    TIME_CURE,
+    TIME_PARTS,
+    MappedColumn,
+    MappedTable,
+    applied_geoid,
+    convert_columns,
+    map_headers,
+    map_text,
+    needed_columns,
+    word_findings,
+)
+from sbas.logs.delimited_layout import Layout, data_rows, find_layout, split_line
+from sbas.logs.format import Format, Match, Progress
+from sbas.logs.text_input import (
+    BAD_SHARE,
+    TextBlocks,
+    bad_line_finding,
+    collapse_blanks,
+    decode_head,
+    parse_lines,
+    parse_numbers,
+    plain_blanks,
+    side_by_side,
+)
+from sbas.logs.time_stamps import (
+    Stamps,
+    concatenate,
+    parse_date_and_clock,
+    parse_stamps,
+    scale_of_stamps,
+    stamps_to_gps,
+    week_stamps,
+)
+from sbas.recording import Recording, RecordingMeta, with_columns
+from sbas.timescales import TimeScale
+
+_TEXT_COLUMNS = ("time", "date", "mode", "environment", "hardware_fault")
+_COMMENT_LINE = re.compile(rb"^[ \t]*[#%][^\n]*\n?", re.MULTILINE)
+
+
+def read(
+    path: Path,
+    *,
+    columns: Sequence[str] | None = None,
+    progress: Progress | None = None,
+    time_scale: TimeScale | None = None,
+    mode_map: Mapping[str, str] | None = None,
+    geoid: float | None = None,
+) -> Recording:
+    """Recording of a delimited text file.
+
+    Parameters
+    ----------
+    path : the file.
+    columns : documented columns to read; all by default.
+    progress : called with bytes done and in all.
+    time_scale : scale of the stamps; by default UTC for a column `utc` or stamps with a zone,
+        else GPST.
+    mode_map : words of the mode column to names of `sbas.recording.MODES`.
+    geoid : undulation [m] where heights are above the geoid (column `altitude`).
+
+    Raises
+    ------
+    InputError : no readable time, ambiguous columns or decimals, unknown units or mode words.
+    """
+    mapped = read_mapped(
+        path,
+        columns=columns,
+        progress=progress,
+        time_scale=time_scale,
+        mode_map=mode_map,
+        geoid=geoid,
+    )
+    meta = RecordingMeta(
+        time_scale=mapped.time_scale,
+        leap_seconds=mapped.leap_seconds,
+        geoid=mapped.geoid,
+        findings=mapped.findings,
+        options=mapped.options,
+    )
+    table = mapped.table if columns is None else with_columns(mapped.table, columns)
+    return Recording(table, meta)
+
+
+def read_mapped(
+    path: Path,
+    *,
+    columns: Collection[str] | None = None,
+    extra: Collection[str] = (),
+    progress: Progress | None = None,
+    time_scale: TimeScale | None = None,
+    mode_map: Mapping[str, str] | None = None,
+    geoid: float | None = None,
+) -> MappedTable:
+    """As `read`, before it becomes a Recording; `extra` names columns of `TRUTH_COLUMNS`."""
+    blocks = TextBlocks(path, progress)
+    stream = iter(blocks)
+    first = next(stream, b"")
+    if not first.strip():
+        raise InputError(
+            "E15: the file has no whole line" if blocks.unfinished else "E15: the file is blank",
+            where=str(path),
+            cure="check that the file was written and copied to its end",
+        )
+    sample = first[: 1 << 18].decode("utf-8", "replace")
+    layout = find_layout(sample, where=str(path))
+    reader = _LineReader.of(layout, columns, extra, str(path))
+    reader.check_decimals(sample)
+
+    last_line = b""
+
+    def data_blocks() -> Iterable[bytes]:
+        nonlocal last_line
+        for block in chain((_behind_line(first, layout.header_line),), stream):
+            last_line = _last_line(block) or last_line
+            yield block
+
+    parts = list(side_by_side(reader.block, data_blocks()))
+    cut_lines = 0
+    if blocks.unfinished.strip():
+        if _is_whole(blocks.unfinished, last_line, layout):
+            parts.append(reader.block(blocks.unfinished + b"\n"))
+        else:
+            cut_lines = 1
+    return _joined(
+        parts, reader, blocks, cut_lines, time_scale=time_scale, mode_map=mode_map, geoid=geoid
+    )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One block's lines with a readable time."""
+
+    stamps: Stamps
+    numbers: dict[str, NDArray[np.float64]]
+    texts: dict[str, Any]
+    bad_lines: int
+    example: str
+    unreadable: dict[str, int] = field(default_factory=dict)
+    words: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _LineReader:
+    """What every block of a file is read with."""
+
+    layout: Layout
+    mapped: Mapping[str, MappedColumn]
+    others: Mapping[str, MappedColumn]
+    wanted: tuple[str, ...]
+    where: str
+
+    @classmethod
+    def of(
+        cls, layout: Layout, columns: Collection[str] | None, extra: Collection[str], where: str
+    ) -> _LineReader:
+        mapped, others = map_headers(layout.headers, where=where, extra=extra)
+        has_week = "week" in mapped and "tow" in mapped
+        if "time" in mapped and has_week:
+            raise InputError(
+                "two columns say the time",
+                where=where,
+                evidence=f"{mapped['time'].header!r} beside week and seconds of week",
+                cure="take one of them out, or rename it to 'x_time'",
+            )
+        if "time" not in mapped and not has_week:
+            lonely = [mapped[name].header for name in TIME_PARTS if name in mapped]
+            raise InputError(
+                "no column gives the time",
+                where=where,
+                evidence=f"columns {', '.join(h.strip() for h in layout.headers)[:300]}"
+                + (f"; {', '.join(lonely)} alone is not enough" if lonely else ""),
+                cure="name the time column 'time' (GPS time) or 'utc', or give 'week' and 'tow'",
+            )
+        names = needed_columns(columns, mapped, others)
+        return cls(layout, mapped, others, names, where)
+
+    def check_decimals(self, sample: str) -> None:
+        """E20 where decimal commas meet decimal points, or a delimiter that is a comma."""
+        rows = data_rows(sample, self.layout)
+        numeric = [
+            self._column(name).index
+            for name in self.wanted
+            if name not in _TEXT_COLUMNS and not name.startswith("x_")
+        ]
+        cells = [row[i] for row in rows for i in numeric if i < len(row)]
+        commas = [c for c in cells if re.fullmatch(r"\s*[+-]?\d+,\d+\s*", c)]
+        points = [c for c in cells if re.fullmatch(r"\s*[+-]?\d*\.\d+\s*", c)]
+        if commas and (points or self.layout.delimiter in " ,"):
+            raise InputError(
+                "E20: decimal comma and decimal point in one file"
+                if points
+                else "E20: decimal commas, with blanks or commas between the fields",
+                where=self.where,
+                evidence=", ".join([*commas[:2], *points[:2]]),
+                cure="write all numbers with a decimal point, or separate fields by ';' and "
+                "write all with a comma",
+            )
+
+    def _column(self, name: str) -> MappedColumn:
+        return self.mapped[name] if name in self.mapped else self.others[name]
+
+    def block(self, block: bytes) -> _Part:
+        """Columns of one block of lines; lines without a readable time are left out."""
+        if b"#" in block or b"%" in block:
+            block = _COMMENT_LINE.sub(b"", block)
+        if self.layout.delimiter == " ":
+            block = collapse_blanks(plain_blanks(block))
+        times = tuple(name for name in TIME_PARTS if name in self.mapped)
+        index = {name: str(self._column(name).index) for name in (*times, *self.wanted)}
+        texts = [index[name] for name in index if name in _TEXT_COLUMNS or name.startswith("x_")]
+        fields = parse_lines(
+            block,
+            [str(i) for i in range(len(self.layout.headers))],
+            texts=texts,
+            wanted=list(index.values()),
+            delimiter=self.layout.delimiter,
+            decimal=self.layout.decimal,
+        )
+        back = {i: name for name, i in index.items()}
+        numbers = {back[i]: v for i, v in fields.numbers.items()}
+        text = {back[i]: v for i, v in fields.texts.items()}
+        unreadable = {back[i]: v for i, v in fields.unreadable.items()}
+        stamps = self._stamps(numbers, text)
+        bad, example = fields.bad_lines, fields.first_bad
+        good = stamps.readable
+        if not good.all():
+            if not example:
+                at = int(np.argmin(good))
+                shown = [text[n][at].as_py() if n in text else numbers[n][at] for n in times]
+                example = f"time {' '.join(map(str, shown))}"
+            bad += int(np.count_nonzero(~good))
+            stamps = stamps[good]
+            mask = pa.array(good)
+            numbers = {name: v[good] for name, v in numbers.items()}
+            text = {name: v.filter(mask) for name, v in text.items()}
+            unreadable = {name: v[good] for name, v in unreadable.items()}
+        return _Part(
+            stamps,
+            {name: v for name, v in numbers.items() if name not in TIME_PARTS},
+            {name: v for name, v in text.items() if name not in TIME_PARTS},
+            bad,
+            example,
+            {n: int(np.count_nonzero(v)) for n, v in unreadable.items() if n not in TIME_PARTS},
+            {back[i]: n for i, n in fields.words.items() if back[i] not in TIME_PARTS},
+        )
+
+    def _stamps(
+        self, numbers: Mapping[str, NDArray[np.float64]], text: Mapping[str, Any]
+    ) -> Stamps:
+        if "time" not in self.mapped:
+            return week_stamps(numbers["week"], numbers["tow"] * self.mapped["tow"].factor)
+        if "date" not in self.mapped:
+            return parse_stamps(text["time"])
+        whole = parse_stamps(text["time"])
+        return whole if whole.readable.any() else parse_date_and_clock(text["date"], text["time"])
+
+
+def _joined(
+    parts: Sequence[_Part],
+    reader: _LineReader,
+    blocks: TextBlocks,
+    cut_lines: int,
+    *,
+    time_scale: TimeScale | None,
+    mode_map: Mapping[str, str] | None,
+    geoid: float | None,
+) -> MappedTable:
+    stamps = concatenate([part.stamps for part in parts])
+    rows = len(stamps.ns)
+    bad = sum(part.bad_lines for part in parts) + cut_lines + blocks.nul_lines
+    example = next((part.example for part in parts if part.example), "")
+    if cut_lines and not example:
+        example = (
+            f"last line without line end: {blocks.unfinished[:120].decode('utf-8', 'replace')}"
+        )
+    if not rows:
+        raise InputError(
+            "no line has a readable time" if bad else "E15: the file has a header and no data",
+            where=reader.where,
+            evidence=example,
+            cure=TIME_CURE if bad else "check that the recording was written",
+        )
+    by_week = "time" not in reader.mapped
+    header = "week and tow" if by_week else reader.mapped["time"].header
+    said = "GPST" if by_week else reader.mapped["time"].scale
+    scale, scale_findings = scale_of_stamps(
+        stamps, time_scale, said=said, header=header, by_week=by_week, where=reader.where
+    )
+    keep: Any = slice(None)
+    if scale == "GPST" and stamps.leap.any():
+        # GPS time has no second 60: such a stamp is no time.
+        keep = ~stamps.leap
+        bad += int(np.count_nonzero(stamps.leap))
+        stamps, rows = stamps[keep], int(np.count_nonzero(keep))
+        example = example or "second 60 in GPS time"
+    times, leap_seconds, conversions = stamps_to_gps(stamps, scale)
+
+    values: dict[str, NDArray[np.float64]] = {}
+    texts: dict[str, Any] = {}
+    for name in reader.wanted:
+        if name in parts[0].numbers:
+            values[name] = np.concatenate([part.numbers[name] for part in parts])[keep]
+            continue
+        column = pa.chunked_array([part.texts[name] for part in parts]).combine_chunks()
+        if isinstance(column, pa.ChunkedArray):
+            column = pa.concat_arrays(column.chunks)
+        if not isinstance(keep, slice):
+            column = column.filter(pa.array(keep))
+        if name.startswith("x_"):
+            numbers, wrong, _ = parse_numbers(column, reader.layout.decimal)
+            if not wrong.any():
+                values[name] = numbers
+                continue
+        texts[name] = column
+    columns, column_findings = convert_columns(
+        values,
+        texts,
+        rows=rows,
+        factors={name: column.factor for name, column in reader.mapped.items()},
+        mode_map=mode_map,
+        geoid=geoid,
+        where=reader.where,
+    )
+    findings = (
+        *blocks.findings(),
+        *_decimal_finding(reader.layout),
+        *bad_line_finding(bad, rows, example),
+        *_unreadable_findings(parts, rows),
+        *scale_findings,
+        *conversions,
+        *word_findings(_summed(part.words for part in parts)),
+        *column_findings,
+    )
+    options = {"columns": map_text(reader.mapped, reader.others)}
+    if not said and time_scale is None and scale == "GPST":
+        options["time_scale"] = "GPST, since neither header nor times name another"
+    if mode_map is not None:
+        options["mode_map"] = ", ".join(f"{word}={name}" for word, name in mode_map.items())
+    table = pd.DataFrame(columns, index=pd.DatetimeIndex(times, name="time"))
+    geoid_text = applied_geoid(geoid, reader.wanted)
+    return MappedTable(table, findings, scale, leap_seconds, options, geoid_text)
+
+
+def _summed(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
+    total: dict[str, int] = {}
+    for count in counts:
+        for name, number in count.items():
+            total[name] = total.get(name, 0) + number
+    return total
+
+
+def _unreadable_findings(parts: Sequence[_Part], rows: int) -> tuple[Finding, ...]:
+    counts = _summed(part.unreadable for part in parts)
+    counts = {name: number for name, number in counts.items() if number}
+    if not counts:
+        return ()
+    return (
+        Finding(
+            "E10",
+            "error" if max(counts.values()) > BAD_SHARE * rows else "warning",
+            "fields that are no numbers were made missing",
+            evidence=", ".join(f"{name} {number:,}" for name, number in counts.items()),
+            cure="correct the fields; name the column 'x_...' if it holds no such quantity",
+        ),
+    )
+
+
+def _decimal_finding(layout: Layout) -> tuple[Finding, ...]:
+    if layout.decimal == ".":
+        return ()
+    return (
+        Finding(
+            "E20",
+            "warning",
+            "commas in numbers were read as decimal commas",
+            evidence=f"fields are separated by {layout.delimiter!r}",
+            cure="write numbers with a decimal point",
+        ),
+    )
+
+
+def _behind_line(block: bytes, line: int) -> bytes:
+    at = 0
+    for _ in range(line + 1):
+        at = block.find(b"\n", at) + 1
+        if not at:
+            return b""
+    return block[at:]
+
+
+def _last_line(block: bytes) -> bytes:
+    return block.rstrip(b"\r\n").rpartition(b"\n")[2]
+
+
+def _is_whole(line: bytes, before: bytes, layout: Layout) -> bool:
+    """Whether a last line without line end is complete, as far as its form can tell.
+
+    A cut in the last field would leave a number that looks right; so that field must be a
+    decimal fraction with as many decimals as in the line before.
+    """
+    decimals = re.compile(rf"{re.escape(layout.decimal)}(\d+)$")
+    shapes = []
+    for text in (line, before):
+        fields = split_line(text.decode("utf-8", "replace").strip(), layout.delimiter)
+        found = decimals.search(fields[-1].strip()) if fields else None
+        shapes.append((len(fields), len(found[1]) if found else 0))
+    return shapes[0] == shapes[1] and shapes[0][1] > 0
+
+
+def sniff(head: bytes, middle: bytes, tail: bytes, path: Path) -> Match:
+    """60 for a table with time and position, 50 with time and another known column, else 25."""
+    text = decode_head(head)
+    odd = sum(not c.isprintable() and c not in "\r\n\t\0" for c in text[:4096])
+    if text.lstrip()[:1] in ("<", "{", "["):
+        return Match(0, "looks like XML or JSON")
+    if not text.strip() or odd > 0.02 * min(len(text), 4096):
+        return Match(0, "not text")
+    try:
+        layout = find_layout(text, where=str(path))
+        mapped, _ = map_headers(layout.headers, where=str(path))
+    except InputError as error:
+        likely = 25 if error.what.startswith(("E20", "two columns")) or "unit" in error.what else 0
+        return Match(likely, f"text, but {error.what}")
+    timed = "time" in mapped or ("week" in mapped and "tow" in mapped)
+    if timed and "lat_deg" in mapped and "lon_deg" in mapped:
+        return Match(60, "delimited text with columns for time and position")
+    if timed and len(set(mapped) - set(TIME_PARTS)):
+        return Match(50, "delimited text with a column for time")
+    if data_rows(text, layout):
+        return Match(25, "delimited text, header without known time and position")
+    return Match(0, "text without fields")
+
+
+FORMAT = Format(
+    name="csv",
+    extensions=(".csv", ".tsv"),
+    description="delimited text with a header line (comma, semicolon, tab or blanks)",
+    sniff=sniff,
+    read=read,
+)

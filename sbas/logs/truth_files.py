@@ -1,0 +1,117 @@
+"""Truth trajectories: position over time from CSV or Parquet.
+
+A truth must be clean: what a recording may carry as a warning (unreadable lines, sentinels,
+heights of unknown kind) is refused here, since every error figure would rest on it.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pandas as pd
+import pyarrow.parquet as pq
+
+from sbas.exceptions import InputError
+from sbas.logs import delimited_text
+from sbas.logs.column_map import TRUTH_COLUMNS, MappedTable
+from sbas.logs.parquet import opened, read
+from sbas.logs.parquet_foreign import map_foreign
+from sbas.logs.parquet_writer import META_KEY
+from sbas.timescales import TimeScale
+
+POSITION = ("lat_deg", "lon_deg", "height_m")
+
+
+def read_truth_table(
+    path: str | os.PathLike[str],
+    *,
+    time_scale: TimeScale | None = None,
+    geoid: float | None = None,
+) -> pd.DataFrame:
+    """Truth trajectory of a file.
+
+    Parameters
+    ----------
+    path : CSV or Parquet with time, latitude, longitude and height, in any spelling that the
+        alias map of delimited text knows; optional `sigma_h_m`, `sigma_v_m`, `heading_deg`.
+    time_scale : scale of the times; needed for Parquet without metadata of sbas.
+    geoid : undulation [m] where the heights are above the geoid.
+
+    Returns
+    -------
+    Table indexed by `time` (GPS time), float64 columns `lat_deg`, `lon_deg`, `height_m`, and
+    the optional ones that the file has; rows in file order.
+
+    Raises
+    ------
+    InputError : a column is missing, or anything was odd about the file.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(
+            "there is no such truth file", where=str(path), cure="check the name and the folder"
+        )
+    with open(file, "rb") as stream:
+        is_parquet = stream.read(4) == b"PAR1"
+    columns = (*POSITION, *TRUTH_COLUMNS)
+    if not is_parquet:
+        mapped = delimited_text.read_mapped(
+            file, columns=columns, extra=TRUTH_COLUMNS, time_scale=time_scale, geoid=geoid
+        )
+        return _checked(mapped, str(path))
+    with opened(file) as parquet:
+        if META_KEY not in (parquet.schema_arrow.metadata or {}):
+            mapped = _foreign(parquet, file, columns, time_scale, geoid)
+            return _checked(mapped, str(path))
+    recording = read(file, columns=POSITION, time_scale=time_scale, geoid=geoid)
+    errors = tuple(f for f in recording.meta.findings if f.severity == "error")
+    return _checked(MappedTable(recording.table, errors, "GPST", None, {}), str(path))
+
+
+def _foreign(
+    parquet: pq.ParquetFile,
+    file: Path,
+    columns: tuple[str, ...],
+    time_scale: TimeScale | None,
+    geoid: float | None,
+) -> MappedTable:
+    if time_scale is None:
+        raise InputError(
+            "the truth does not say in which time scale its times are",
+            where=str(file),
+            cure="say time_scale='GPST' or 'UTC'; 18 s are 700 m at 140 km/h",
+        )
+    return map_foreign(
+        parquet, file, columns=columns, extra=TRUTH_COLUMNS, time_scale=time_scale, geoid=geoid
+    )
+
+
+def _checked(mapped: MappedTable, where: str) -> pd.DataFrame:
+    lacking = [name for name in POSITION if name not in mapped.table]
+    if lacking:
+        raise InputError(
+            f"the truth has no {', '.join(lacking)}",
+            where=where,
+            evidence=mapped.options.get("columns", ", ".join(mapped.table.columns)),
+            cure="name the columns time, lat_deg, lon_deg, height_m",
+        )
+    odd = [finding for finding in mapped.findings if finding.severity != "info"]
+    if odd:
+        raise InputError(
+            f"the truth is not clean: {odd[0].message}",
+            where=where,
+            evidence=odd[0].evidence,
+            cure=odd[0].cure or "correct the file",
+        )
+    table = mapped.table[[n for n in (*POSITION, *TRUTH_COLUMNS) if n in mapped.table]]
+    incomplete = table[list(POSITION)].isna().any(axis=1)
+    if incomplete.any():
+        raise InputError(
+            "the truth has rows without a position",
+            where=where,
+            evidence=f"{int(incomplete.sum()):,} of {len(table):,}, first at "
+            f"{table.index[incomplete.to_numpy().argmax()]}",
+            cure="take those rows out: a gap in the truth is honest",
+        )
+    return table.astype("f8")

@@ -1,0 +1,114 @@
+"""The report of an evaluation: its sections in order, and one HTML file of them."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import Any
+
+from sbas.exceptions import InputError
+from sbas.integrity.results import Evaluation
+from sbas.reporting.content import Section
+from sbas.reporting.numbers import count, hours, stamp
+from sbas.reporting.sections import (
+    event_list,
+    exposure_hours,
+    glossary,
+    input_files,
+    input_findings,
+    method_trace,
+    parameters,
+    pictures,
+    results,
+    verdict,
+)  # fmt: skip
+
+_SECTIONS = (
+    verdict.section,
+    results.section,
+    pictures.section,
+    exposure_hours.section,
+    input_files.section,
+    input_findings.section,
+    event_list.section,
+    parameters.section,
+    method_trace.section,
+    glossary.section,
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """A title, one line about what was evaluated, and the sections in their order."""
+
+    title: str
+    subtitle: str
+    sections: tuple[Section, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "title": self.title,
+            "subtitle": self.subtitle,
+            "sections": [section.to_dict() for section in self.sections],
+        }
+
+
+def report_of(evaluation: Evaluation) -> Report:
+    """The report of an evaluation as data, pictures drawn."""
+    names = [PurePath(source.path).name or source.path for source in evaluation.meta.sources]
+    title = ", ".join(names[:2]) or "recording without a file"
+    if len(names) > 2:
+        title += f" and {len(names) - 2} more"
+    survey = evaluation.input.survey
+    subtitle = (
+        f"{count(evaluation.epochs)} epochs, {hours(evaluation.hours)} recorded, "
+        f"{stamp(survey.begin_ns)} to {stamp(survey.end_ns)} GPST"
+    )
+    return Report(title, subtitle, tuple(section(evaluation) for section in _SECTIONS))
+
+
+def render_html(document: Report) -> str:
+    """The report as one HTML page that refers to nothing outside itself."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    # File headers and names are hostile text: everything is escaped but the drawn SVG.
+    environment = Environment(
+        loader=PackageLoader("sbas.reporting"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report.html").render(report=document)
+
+
+def report(evaluation: Evaluation, path: str | os.PathLike[str]) -> Path:
+    """Write the report of an evaluation as one self-contained HTML file.
+
+    Parameters
+    ----------
+    evaluation : result of `sbas.evaluate`.
+    path : the file to write; one that exists is replaced.
+
+    Returns
+    -------
+    The path. The same evaluation gives the same bytes: no clock is read.
+
+    Raises
+    ------
+    InputError : the file cannot be written.
+    """
+    target = Path(path)
+    page = render_html(report_of(evaluation))
+    try:
+        target.write_text(page, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise InputError(
+            "the report cannot be written",
+            where=str(target),
+            evidence=error.strerror or str(error),
+            cure="name a file in a folder that exists and may be written to",
+        ) from error
+    return target

@@ -1,0 +1,1 @@
+"""The report's sections: one pure function `section(evaluation) -> Section` a file."""

@@ -1,0 +1,356 @@
+"""Delimited text: headers, units, times, sentinels, decimals, damage."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sbas.exceptions import InputError
+from sbas.logs import delimited_text
+from sbas.recording import MODES, Flag, Recording
+
+T = "2025-05-23 14:09:1"
+
+
+def read(folder: Path, text: str | bytes, **options: object) -> Recording:
+    path = folder / "table.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return delimited_text.read(path, **options)  # type: ignore[arg-type]
+
+
+def codes(recording: Recording) -> list[tuple[str, str]]:
+    return [(f.code, f.severity) for f in recording.meta.findings]
+
+
+def one(folder: Path, header: str, value: str, **options: object) -> pd.Series:
+    recording = read(folder, f"time,{header}\n{T}6,{value}\n", **options)
+    return recording.table.drop(columns="flags", errors="ignore").iloc[:, 0]
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_delimiters(tmp_path: Path, delimiter: str) -> None:
+    text = f"time,lat,lon,height,HPL,n_sat\n{T}6,50.5,15.25,289.5,11.5,9\n{T}7,50.6,15.35,,12.5,8\n"
+    recording = read(tmp_path, text.replace(",", delimiter))
+    table = recording.table
+    assert table.index.to_numpy().astype("M8[s]").astype(str).tolist() == [
+        "2025-05-23T14:09:16", "2025-05-23T14:09:17",
+    ]  # fmt: skip
+    assert table["lat_deg"].tolist() == [50.5, 50.6]
+    assert table["n_sv"].tolist() == [9, 8]
+    assert table["height_m"].isna().tolist() == [False, True]
+    assert recording.meta.findings == ()
+    assert recording.meta.time_scale == "GPST"
+    assert "lat_deg <- lat" in recording.meta.options["columns"]
+
+
+def test_blanks_and_comments(tmp_path: Path) -> None:
+    text = f"# receiver 1\n# date time  lat   lon\n{T}6   50.5  15.2\n# note\n  {T}7  50.6 15.3 \n"
+    table = read(tmp_path, text).table
+    assert table["lat_deg"].tolist() == [50.5, 50.6]
+    assert len(table) == 2
+
+
+@pytest.mark.parametrize(
+    ("header", "value", "name", "expected"),
+    [
+        ("HPL [m]", "11.5", "hpl_m", 11.5),
+        ("hpl_mm", "11500", "hpl_m", 11.5),
+        ("HPL-SBAS(km)", "0.0115", "hpl_m", 11.5),
+        ("VPL (cm)", "1550", "vpl_m", 15.5),
+        ("lat(deg)", "50.5", "lat_deg", 50.5),
+        ("Latitude [rad]", repr(math.radians(50.5)), "lat_deg", 50.5),
+        ("lng", "15.5", "lon_deg", 15.5),
+        ("h_ell", "289.5", "height_m", 289.5),
+        ("h_mm", "289500", "height_m", 289.5),
+        ("sdn", "1.5", "sigma_n_m", 1.5),
+        ("SDE [mm]", "1500", "sigma_e_m", 1.5),
+        ("num SV", "9", "n_sv", 9),
+        ("speed [km/h]", "36", "speed_mps", 10.0),
+        ("cov_en_m2", "-0.5", "cov_en_m2", -0.5),
+        ("geo_prn", "123", "geo_prn", 123),
+        ("Correction_Age [ms]", "2780", "correction_age_s", 2.78),
+        ("x_lat", "3", "x_lat", 3.0),
+        ("C/N0 mean", "44.5", "x_C_N0_mean", 44.5),
+        ("comment", "tunnel", "x_comment", "tunnel"),
+    ],
+)
+def test_headers_and_units(
+    tmp_path: Path, header: str, value: str, name: str, expected: object
+) -> None:
+    series = one(tmp_path, header, value)
+    assert series.name == name
+    found = series.iloc[0]
+    assert found == (
+        pytest.approx(expected, rel=1e-15) if isinstance(expected, float) else expected
+    )
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("time,lat,latitude", "two columns mean lat_deg"),
+        ("time,utc,lat", "two columns mean time"),
+        ("time,week,tow", "two columns say the time"),
+        ("time,lat [ft],lon", "unit"),
+        ("time,hpl [deg],lon", "unit"),
+        ("time [s],lat,lon", "unit"),
+        ("date,lat,lon", "no column gives the time"),
+        ("tow,lat,lon", "no column gives the time"),
+        ("a,b,c", "no column gives the time"),
+    ],
+)
+def test_ambiguous_headers_are_refused(tmp_path: Path, header: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        read(tmp_path, f"{header}\n{T}6,1,2\n")
+    assert caught.value.cure
+
+
+def test_both_heights_the_ellipsoidal_one_serves(tmp_path: Path) -> None:
+    table = read(tmp_path, f"time,height,altitude\n{T}6,289.5,245.0\n").table
+    assert table["height_m"].tolist() == [289.5]
+    assert table["x_altitude"].tolist() == [245.0]
+
+
+@pytest.mark.parametrize(
+    ("header", "stamps", "expected", "scale"),
+    [
+        ("time", "2009-09-19 00:00:00", "2009-09-19T00:00:00", "GPST"),
+        ("GPST", "2009-09-19T00:00:00.25", "2009-09-19T00:00:00.25", "GPST"),
+        ("utc", "2009-09-18 23:59:45", "2009-09-19T00:00:00", "UTC"),
+        ("time", "2009-09-18T23:59:45Z", "2009-09-19T00:00:00", "UTC"),
+        ("Time (UTC)", "2009-09-18 23:59:45", "2009-09-19T00:00:00", "UTC"),
+        ("timestamp", "2009-09-19T01:59:45+02:00", "2009-09-19T00:00:00", "UTC"),
+        ("utc", "2016-12-31 23:59:60", "2017-01-01T00:00:17", "UTC"),
+        ("date,time", "2009-09-19,00:00:00.5", "2009-09-19T00:00:00.5", "GPST"),
+        ("date,utc", "2009/09/18,23:59:45", "2009-09-19T00:00:00", "UTC"),
+        ("week,tow", "1549,518400.000000001", "2009-09-19T00:00:00.000000001", "GPST"),
+        ("week,SOW [ms]", "1549,518400250", "2009-09-19T00:00:00.25", "GPST"),
+    ],
+)
+def test_times(tmp_path: Path, header: str, stamps: str, expected: str, scale: str) -> None:
+    recording = read(tmp_path, f"{header},lat\n{stamps},50.5\n")
+    assert recording.time.astype(str).tolist() == [str(np.datetime64(expected, "ns"))]
+    assert recording.meta.time_scale == scale
+    assert codes(recording) == ([] if scale == "GPST" else [("E25", "info")])
+
+
+def test_time_scale_as_asked(tmp_path: Path) -> None:
+    text = f"time,lat\n{T}6,50.5\n"
+    assert str(read(tmp_path, text, time_scale="UTC").time[0])[:19] == "2025-05-23T14:09:34"
+    assert str(read(tmp_path, text, time_scale="BDT").time[0])[:19] == "2025-05-23T14:09:30"
+    with pytest.raises(InputError, match="zone"):
+        read(tmp_path, text.replace("6,", "6Z,"), time_scale="GPST")
+    with pytest.raises(InputError, match="some times name a zone"):
+        read(tmp_path, text + f"{T}7Z,50.5\n")
+
+
+@pytest.mark.parametrize("stamp", ["518400.0", "1747999999", "14:09:16", "23.05.2025 14:09:16"])
+def test_times_without_origin_or_order_are_refused(tmp_path: Path, stamp: str) -> None:
+    with pytest.raises(InputError, match="no line has a readable time") as caught:
+        read(tmp_path, f"time,lat\n{stamp},50.5\n")
+    assert "week" in caught.value.cure
+    assert stamp in caught.value.evidence
+
+
+def test_modes_need_a_map(tmp_path: Path) -> None:
+    text = f"time,fix\n{T}6,3\n{T}7,1\n{T}8,\n"
+    with pytest.raises(InputError, match="not known") as caught:
+        read(tmp_path, text)
+    assert "mode_map" in caught.value.cure
+    table = read(tmp_path, text, mode_map={"3": "sbas", 1: "standalone"}).table
+    assert table["mode"].astype(object).tolist()[:2] == ["sbas", "standalone"]
+    assert table["mode"].isna().tolist() == [False, False, True]
+    with pytest.raises(InputError, match="unknown modes"):
+        read(tmp_path, text, mode_map={"3": "SBAS", "1": "none"})
+    assert one(tmp_path, "mode", "sbas_pa").tolist() == ["sbas_pa"]
+
+
+def test_altitudes_need_the_undulation(tmp_path: Path) -> None:
+    text = f"time,alt\n{T}6,245.0\n"
+    without = read(tmp_path, text)
+    assert without.table["height_m"].isna().all()
+    assert codes(without) == [("E25", "warning")]
+    assert read(tmp_path, text, geoid=44.5).table["height_m"].tolist() == [289.5]
+    assert codes(read(tmp_path, text, geoid=44.5)) == [("E25", "info")]
+    assert codes(read(tmp_path, f"time,h\n{T}6,245.0\n", geoid=44.5)) == [("E25", "warning")]
+
+
+@pytest.mark.parametrize(
+    ("header", "value", "column", "flag"),
+    [
+        ("hpl", "-2e10", "hpl_m", Flag.PL_SENTINEL),
+        ("hpl", "4294967295", "hpl_m", Flag.PL_SENTINEL),
+        ("hpl_mm", "4294967295", "hpl_m", Flag.PL_SENTINEL),
+        ("vpl", "655.35", "vpl_m", Flag.PL_SENTINEL),
+        ("hpl", "inf", "hpl_m", Flag.PL_SENTINEL),
+        ("lat_rad", "-2e10", "lat_deg", Flag.POSITION_SENTINEL),
+        ("height", "-20000000000.0", "height_m", Flag.POSITION_SENTINEL),
+        ("hdop", "99.99", "hdop", Flag(0)),
+        ("vdop", "655.35", "vdop", Flag(0)),
+        ("sdn", "65535", "sigma_n_m", Flag(0)),
+    ],
+)
+def test_sentinels(tmp_path: Path, header: str, value: str, column: str, flag: Flag) -> None:
+    recording = read(tmp_path, f"time,{header}\n{T}6,12.5\n{T}7,{value}\n")
+    assert recording.table[column].isna().tolist() == [False, True]
+    flags = recording.table.get("flags", pd.Series([0, 0])).tolist()
+    assert flags == [0, flag]
+    assert codes(recording) == [("E07", "warning")]
+    assert f"{column}: 1 x" in recording.meta.findings[0].evidence
+
+
+def test_paired_sentinels(tmp_path: Path) -> None:
+    text = (
+        "time,lat,lon,hpl,vpl,nsv\n"
+        f"{T}5,0,0,8000,100,255\n{T}6,0,15.5,8000,90,9\n{T}7,50.5,0,20,100,65535\n"
+    )
+    table = read(tmp_path, text).table
+    assert table["lat_deg"].isna().tolist() == [True, False, False]
+    assert table["lon_deg"].isna().tolist() == [True, False, False]
+    assert table["hpl_m"].isna().tolist() == [True, False, False]
+    assert table["vpl_m"].isna().tolist() == [True, False, False]
+    assert table["n_sv"].tolist() == [-1, 9, -1]
+    only = read(tmp_path, text, columns=["hpl_m"]).table
+    pd.testing.assert_frame_equal(only, table[["hpl_m"]])
+
+
+def test_levels_of_zero_are_left_for_the_input_check(tmp_path: Path) -> None:
+    recording = read(tmp_path, f"time,hpl\n{T}6,0\n{T}7,-1\n")
+    assert recording.table["hpl_m"].tolist() == [0.0, -1.0]
+    assert recording.meta.findings == ()
+
+
+def test_a_height_of_655_35_m_is_a_height(tmp_path: Path) -> None:
+    assert one(tmp_path, "height", "655.35").tolist() == [655.35]
+
+
+def test_nan_words_and_unreadable_fields(tmp_path: Path) -> None:
+    rows = "".join(f"2025-05-23 {h:02d}:{m:02d}:00,11.5\n" for h in range(20) for m in range(60))
+    text = "time,hpl\n" + rows + f"2025-05-24 00:00:00,NaN\n2025-05-24 00:00:01,n/a\n{T}6,11;5\n"
+    recording = read(tmp_path, text)
+    assert recording.table["hpl_m"].isna().sum() == 3
+    assert codes(recording) == [("E10", "warning"), ("E07", "warning")]
+    assert "hpl_m 1" in recording.meta.findings[0].evidence
+    assert "hpl_m: 2 x NaN" in recording.meta.findings[1].evidence
+    fast = read(tmp_path, f"time,hpl\n{T}6,nan\n{T}7,\n{T}8,3.5\n")
+    assert fast.table["hpl_m"].isna().tolist() == [True, True, False]
+    assert "hpl_m: 1 x NaN" in fast.meta.findings[0].evidence
+
+
+def test_counts_out_of_range_are_missing_and_flagged(tmp_path: Path) -> None:
+    recording = read(tmp_path, f"time,nsat\n{T}6,8.5\n{T}7,40000\n{T}8,9.0\n")
+    assert recording.table["n_sv"].tolist() == [-1, -1, 9]
+    assert recording.table["flags"].tolist() == [Flag.OUT_OF_RANGE, Flag.OUT_OF_RANGE, 0]
+    assert codes(recording) == [("E10", "warning")]
+
+
+def test_decimal_commas(tmp_path: Path) -> None:
+    german = read(tmp_path, f"Zeit;time;lat;HPL\nx;{T}6,25;50,5;11,5\n")
+    assert german.table["lat_deg"].tolist() == [50.5]
+    assert str(german.time[0]) == "2025-05-23T14:09:16.250000000"
+    assert codes(german) == [("E20", "warning")]
+    assert read(tmp_path, f"time\tlat\n{T}6\t50,5\n").table["lat_deg"].tolist() == [50.5]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"time;lat;hpl\n{T}6;50,5;11.5\n",
+        f"time,lat,lon\n{T}6,50,5,15,25\n{T}7,50,6,15,35\n",
+        "week tow lat\n1549 518400 50,5\n",
+        f'time,lat\n{T}6,"50,5"\n',
+    ],
+)
+def test_undecided_decimals_are_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(InputError, match="E20"):
+        read(tmp_path, text)
+
+
+def test_short_and_long_lines_are_counted(tmp_path: Path) -> None:
+    rows = [f"2025-05-23 {h:02d}:{m:02d}:00,50.5,11.5\n" for h in range(20) for m in range(60)]
+    rows[10], rows[20] = rows[10][:24] + "\n", rows[20].replace("\n", ",7\n")
+    rows[30] = "2025-05-23 00:61:00,50.5,11.5\n"
+    recording = read(tmp_path, "time,lat,hpl\n" + "".join(rows))
+    assert len(recording) == 1197
+    assert codes(recording) == [("E10", "warning")]
+    assert "3 of 1,200" in recording.meta.findings[0].message
+    bad = read(tmp_path, "time,lat,hpl\n" + "".join(rows[25:60]))
+    assert codes(bad) == [("E10", "error")]
+
+
+def test_last_line_without_end_is_kept_only_if_it_looks_whole(tmp_path: Path) -> None:
+    text = f"time,lat,hpl\n{T}6,50.5,11.25\n{T}7,50.6,12.75"
+    assert read(tmp_path, text).table["hpl_m"].tolist() == [11.25, 12.75]
+    assert read(tmp_path, text).meta.findings == ()
+    for cut in range(1, 30):
+        recording = read(tmp_path, text[:-cut])
+        assert recording.table["hpl_m"].tolist() == [11.25]
+        assert codes(recording) == [("E10", "error")]
+
+
+def test_no_rows(tmp_path: Path) -> None:
+    for text in ("time,lat\n", "time,lat", "\n\n", " "):
+        with pytest.raises(InputError, match="E15"):
+            read(tmp_path, text)
+    with pytest.raises(InputError, match="no table"):
+        read(tmp_path, "hello\nworld\n")
+
+
+def test_table_written_by_pandas_comes_back(tmp_path: Path) -> None:
+    index = pd.date_range("2025-05-23", periods=5, freq="250ms", name="time")
+    table = pd.DataFrame(
+        {
+            "lat_deg": np.linspace(50, 51, 5) / 7,
+            "hpl_m": [1.5, np.nan, 3.25, 4.125, 5.0],
+            "n_sv": np.array([9, -1, 7, 6, 5], "i2"),
+            "flags": np.array([0, 1, 2, 4, 8192], "u4"),
+            "mode": pd.Categorical.from_codes([4, 4, -1, 2, 3], categories=list(MODES)),
+            "environment": pd.Categorical(["open", "cutting", None, "open", "open"],
+                                          categories=["open", "cutting"]),
+            "hardware_fault": [False, True, False, False, True],
+            "x_note": pd.array(["a", "b", "c, d", 'e "f"', "g"], dtype="str"),
+        },
+        index=pd.DatetimeIndex(index.to_numpy().astype("M8[ns]"), name="time"),
+    )  # fmt: skip
+    table.to_csv(tmp_path / "table.csv")
+    back = delimited_text.read(tmp_path / "table.csv")
+    pd.testing.assert_frame_equal(back.table, table, check_like=True)
+    assert back.meta.findings == ()
+
+
+def test_block_size_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = "".join(
+        f"2025-05-23 {k // 3600:02d}:{k // 60 % 60:02d}:{k % 60:02d},{50 + k / 7},{k % 11}\n"
+        for k in range(5000)
+    )
+    text = "time,lat,nsat\n" + rows
+    whole = read(tmp_path, text)
+    monkeypatch.setattr("sbas.logs.text_input.BLOCK_BYTES", 3000)
+    pd.testing.assert_frame_equal(read(tmp_path, text).table, whole.table)
+
+
+HEADERS = st.sampled_from(
+    ["time,lat,lon,hpl\n", "utc;height;mode;n_sv\n", "week tow h_mm\n", "date\ttime\talt\n", ""]
+)
+
+
+@given(HEADERS, st.one_of(st.binary(max_size=300), st.text(
+    "0123456789-: .,;\t\n\"TZe+", max_size=300).map(str.encode)))  # fmt: skip
+def test_any_bytes_give_a_recording_or_an_input_error(
+    tmp_path_factory: pytest.TempPathFactory, header: str, data: bytes
+) -> None:
+    folder = tmp_path_factory.mktemp("fuzz")
+    head = data[: 1 << 16]
+    match = delimited_text.sniff(header.encode() + head, head, head[-4096:], folder)
+    assert 0 <= match.score <= 100
+    try:
+        recording = read(folder, header.encode() + data)
+    except InputError:
+        return
+    assert len(recording) > 0

@@ -1,0 +1,78 @@
+"""Truth trajectories: what they need, and that nothing odd passes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sbas.exceptions import InputError
+from sbas.logs import parquet
+from sbas.logs.truth_files import read_truth_table
+from sbas.recording import Recording
+
+ROWS = "2025-05-23 14:09:16,50.5,15.5,289.5\n2025-05-23 14:09:17,50.6,15.6,289.6\n"
+
+
+def put(folder: Path, text: str) -> Path:
+    path = folder / "truth.csv"
+    path.write_text(text)
+    return path
+
+
+def test_csv(tmp_path: Path) -> None:
+    text = "time,lat_deg,lon_deg,height_m,sigma_h_m,sigma_v_mm,heading_deg,note\n" + ROWS.replace(
+        "\n", ",0.02,30,271.5,x\n"
+    )
+    table = read_truth_table(put(tmp_path, text))
+    assert list(table) == [
+        "lat_deg", "lon_deg", "height_m", "sigma_h_m", "sigma_v_m", "heading_deg",
+    ]  # fmt: skip
+    assert table.iloc[0].tolist() == [50.5, 15.5, 289.5, 0.02, 0.03, 271.5]
+    assert table.index.name == "time"
+    assert table.index.dtype == np.dtype("M8[ns]")
+
+
+def test_utc_and_geoid(tmp_path: Path) -> None:
+    table = read_truth_table(put(tmp_path, "utc,lat,lon,alt\n" + ROWS), geoid=44.5)
+    assert str(table.index[0]) == "2025-05-23 14:09:34"
+    assert table["height_m"].tolist() == [334.0, 334.1]
+    with pytest.raises(InputError, match="above the geoid"):
+        read_truth_table(put(tmp_path, "utc,lat,lon,alt\n" + ROWS))
+
+
+def test_parquet(tmp_path: Path) -> None:
+    table = read_truth_table(put(tmp_path, "time,lat,lon,h\n" + ROWS))
+    own = tmp_path / "own.parquet"
+    parquet.write([Recording(table)], own)
+    pd.testing.assert_frame_equal(read_truth_table(own), table)
+    foreign = tmp_path / "foreign.parquet"
+    table.assign(heading_deg=1.5).reset_index().to_parquet(foreign)
+    found = read_truth_table(foreign, time_scale="GPST")
+    pd.testing.assert_frame_equal(found, table.assign(heading_deg=1.5))
+    with pytest.raises(InputError, match="time scale"):
+        read_truth_table(foreign)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("time,lat,lon\n2025-05-23 14:09:16,50.5,15.5\n", "no height_m"),
+        ("time,lat,lon,h\n" + ROWS.replace("289.5", "-2e10"), "not clean"),
+        ("time,lat,lon,h\n" + ROWS.replace("289.5", "high"), "not clean"),
+        ("time,lat,lon,h\n" + ROWS + "2025-05-23 14:09\n", "not clean"),
+        ("time,lat,lon,h\n" + ROWS + "2025-05-23 14:09:18,50.7,15.7,28", "not clean"),
+        ("time,lat,lon,h\n" + ROWS.replace("289.5", ""), "without a position"),
+    ],
+)
+def test_a_truth_must_be_clean(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        read_truth_table(put(tmp_path, text))
+    assert caught.value.cure
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such truth file"):
+        read_truth_table(tmp_path / "none.csv")

@@ -1,0 +1,150 @@
+"""All pictures, one test: they draw where they are told and leave no trace elsewhere."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import sbas.plots
+from sbas.integrity.evaluation import evaluate
+from tests.plots.synthetic import KINDS, TRUTH, evaluated, synthetic_recording
+
+PICTURES = sbas.plots.__all__
+
+
+def _draw(name: str, evaluation: Any, figure: Figure | None) -> Any:
+    picture = getattr(sbas.plots, name)
+    if figure is None:
+        return picture(evaluation)
+    if name == "strips":
+        return picture(evaluation, axes=list(figure.subplots(4)))
+    return picture(evaluation, ax=figure.subplots())
+
+
+def _texts(figure: Figure) -> str:
+    return "\n".join(t.get_text() for ax in figure.axes for t in ax.texts)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", PICTURES)
+def test_draws_on_the_given_axes_and_touches_nothing_else(name: str, kind: str) -> None:
+    from matplotlib import pyplot
+
+    evaluation = evaluated(kind)
+    settings, open_figures = dict(matplotlib.rcParams), pyplot.get_fignums()
+    before = [np.copy(a) for a in _arrays(evaluation)]
+    figure = Figure(figsize=(5, 6))
+    drawn = np.atleast_1d(_draw(name, evaluation, figure))
+    assert all(ax.figure is figure for ax in drawn)
+    assert set(drawn) == set(figure.axes)
+    assert all(ax.get_xlabel() or ax.get_ylabel() for ax in drawn)
+    figure.canvas.draw()
+    own = np.atleast_1d(_draw(name, evaluation, None))
+    assert own[0].figure is not figure
+    assert dict(matplotlib.rcParams) == settings
+    assert pyplot.get_fignums() == open_figures
+    for a, b in zip(before, _arrays(evaluation), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def _arrays(evaluation: Any) -> list[Any]:
+    curves = [v for v in vars(evaluation.curves).values() if isinstance(v, np.ndarray)]
+    return [*curves, evaluation.strips.low, evaluation.strips.high, evaluation.scatter.counts]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "words"),
+    [
+        ("strips", "nothing_known", "no protection level in this recording"),
+        ("strips", "nothing_known", "no position error in this recording"),
+        ("strips", "without_levels", "no HDOP in this recording"),
+        ("stanford", "moving_without_truth", "no epoch with both"),
+        ("scatter", "moving_without_truth", "no position error"),
+        ("survival", "without_levels", "no epoch with both"),
+        ("availability_curve", "without_levels", "no protection level"),
+        ("rate_curve", "moving_without_truth", "no truth"),
+        ("rate_curve", "own_median", "only a lower bound"),
+    ],
+)
+def test_what_cannot_be_drawn_is_said(name: str, kind: str, words: str) -> None:
+    figure = Figure()
+    _draw(name, evaluated(kind), figure)
+    assert words in _texts(figure)
+
+
+def test_a_spike_of_one_epoch_is_drawn_at_its_height() -> None:
+    evaluation = evaluate(synthetic_recording(100_000, spikes={56_789: 100.0}), truth=TRUTH)
+    level = sbas.plots.strips(evaluation)[0]
+    heights = np.concatenate([line.get_ydata() for line in level.get_lines()])
+    assert np.nanmax(heights) == 100.0
+    x = level.get_lines()[0].get_xdata()[np.nanargmax(level.get_lines()[0].get_ydata())]
+    # The axis is in hours; a bin is 1/1200 of the record.
+    assert x * 3600 == pytest.approx(56_789, abs=100_000 / 1200)
+    low, high = level.get_ylim()
+    assert low < 10 < 100 < high
+
+
+def test_a_gap_stays_empty() -> None:
+    error = sbas.plots.strips(evaluated("ordinary"))[3]
+    line = error.get_lines()[0]
+    x = np.asarray(line.get_xdata()) * 60
+    assert not np.any((x > 1003) & (x < 1097))
+    pieces = np.flatnonzero(np.isnan(line.get_ydata()))
+    assert np.array_equal(pieces, np.arange(2, x.size, 3))
+
+
+def test_stanford_writes_the_counts_of_its_alert_limit() -> None:
+    evaluation = evaluated("ordinary")
+    for limit in (50.0, 20.0):
+        regions = evaluation.at(limit).regions
+        assert regions is not None
+        figure = Figure()
+        sbas.plots.stanford(evaluation, alert_limit_m=limit, ax=figure.subplots())
+        written = _texts(figure)
+        for name, count in (("nominal", "nominal"), ("MI", "mi"), ("HMI", "hmi")):
+            assert f"{name}\n{regions[count]:,}" in written.split("counts for")[0]
+        assert f"AL {limit:g} m" in written
+    with pytest.raises(KeyError):
+        sbas.plots.stanford(evaluation, alert_limit_m=33.0)
+
+
+def test_the_drawn_bound_is_garwoods() -> None:
+    """No event in 3000 s at 95 %: -ln(0.05) * 3600/3000 = 3.5949/h, exact mathematics."""
+    evaluation = evaluate(synthetic_recording(), truth=TRUTH)
+    ax = sbas.plots.rate_curve(evaluation)
+    lines = {str(line.get_label()): line for line in ax.get_lines()}
+    bound = lines["demonstrated: HMI, upper bound at 95 %"]
+    assert bound.get_ydata()[-1] == pytest.approx(-np.log(0.05) * 1.2, rel=1e-12)
+    assert any(label.startswith("claimed: 1e-07/h") for label in lines)
+
+
+def test_the_ellipse_of_95_percent_has_the_rayleigh_factor() -> None:
+    """K = sqrt(chi2.isf(0.05, 2)) = 2.447746830681 (exact mathematics, printed tables 2.448)."""
+    ax = sbas.plots.scatter(evaluated("ordinary"))
+    inner, outer = ax.patches
+    assert outer.width / inner.width == pytest.approx(2.447746830681, rel=1e-12)
+
+
+def test_availability_is_drawn_from_both_ways_to_count_gaps() -> None:
+    evaluation = evaluated("ordinary")
+    ax = sbas.plots.availability_curve(evaluation)
+    lines = {str(line.get_label()): line for line in ax.get_lines()}
+    # 100 of 3000 seconds are a gap, and the spike is one more epoch above every limit but 556 m.
+    down = lines["asked, gaps count as down"].get_ydata()
+    left_out = lines["asked, gaps left out"].get_ydata()
+    np.testing.assert_allclose(down, [101 / 3000] * 3, rtol=1e-9)
+    np.testing.assert_allclose(left_out, [1 / 2900] * 3, rtol=1e-9)
+
+
+def test_sbas_loads_without_matplotlib_and_pictures_without_pyplot() -> None:
+    code = (
+        "import sys, sbas, sbas.integrity.evaluation; assert 'matplotlib' not in sys.modules; "
+        "import sbas.plots, sbas.reporting; assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
