@@ -99,9 +99,10 @@ def find_layout(text: str, *, where: str) -> Layout:
         longer = sum(len(row) > len(layout.headers) for row in rows) > len(rows) / 2
         comma = longer and layout.delimiter == ","
         raise InputError(
-            "E20: lines have more fields than the header: decimal commas between commas?"
+            "lines have more fields than the header: decimal commas between commas?"
             if comma
             else "lines have another number of fields than the header",
+            code="E20" if comma else "E10",
             where=where,
             evidence=f"{len(layout.headers)} names, {len(rows[0])} fields: "
             f"{layout.delimiter.join(rows[0])[:120]}",

@@ -121,7 +121,8 @@ def read_mapped(
     first = next(stream, b"")
     if not first.strip():
         raise InputError(
-            "E15: the file has no whole line" if blocks.unfinished else "E15: the file is blank",
+            "the file has no whole line" if blocks.unfinished else "the file is blank",
+            code="E15",
             where=str(path),
             cure="check that the file was written and copied to its end",
         )

@@ -51,7 +51,7 @@ def read_foreign(
             "the Parquet file does not say in which time scale its times are",
             where=str(path),
             evidence="no metadata of sbas (schema key 'sbas')",
-            cure="say it: --time GPST, or time_scale='UTC' and so on",
+            cure="say it: --time-scale GPST, or time_scale='UTC' and so on",
         )
     mapped = map_foreign(
         file, path, columns=columns, time_scale=time_scale, mode_map=mode_map, geoid=geoid
@@ -120,7 +120,11 @@ def map_foreign(
     stamps = stamps[good]
     if not len(stamps.ns):
         raise InputError(
-            "E15: the table has no row with a time", where=where, evidence=f"{len(table):,} rows"
+            "the table has no row with a time",
+            code="E15",
+            where=where,
+            evidence=f"{len(table):,} rows",
+            cure="check its time column, or write the recording again",
         )
     header = every[time_names[0]].header
     scale, findings = scale_of_stamps(

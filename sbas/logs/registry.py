@@ -202,14 +202,16 @@ def detect(path: str | os.PathLike[str]) -> Detection:
     unread, unread_match, unread_cure = unread_format(head)
     if unread_match.score >= max(best_score, LOWEST_SCORE):
         raise InputError(
-            f"E16: this is {unread}, which this version does not read",
+            f"this is {unread}, which this version does not read",
+            code="E16",
             where=str(path),
             evidence=unread_match.reason,
             cure=unread_cure,
         )
     if best_score < LOWEST_SCORE:
         raise InputError(
-            "E16: the format of the file is not recognised",
+            "the format of the file is not recognised",
+            code="E16",
             where=str(path),
             evidence=_first_sight(head)
             + "; likeliest: "
@@ -219,7 +221,8 @@ def detect(path: str | os.PathLike[str]) -> Detection:
     if len(scored) > 1 and best_score - scored[1][0] < CLOSE_SCORES:
         second_score, second, second_match = scored[1]
         raise InputError(
-            f"E16: the file could be {best.name} or {second.name}",
+            f"the file could be {best.name} or {second.name}",
+            code="E16",
             where=str(path),
             evidence=f"{best.name} {best_score} ({match.reason}), "
             f"{second.name} {second_score} ({second_match.reason})",
@@ -259,7 +262,7 @@ def _prepared(
 
 def _checked_file(path: str | os.PathLike[str]) -> Path:
     file = Path(path)
-    problem = cure = ""
+    problem = cure = code = ""
     try:
         if not file.exists():
             problem, cure = "there is no such file", "check the name and the folder"
@@ -270,14 +273,14 @@ def _checked_file(path: str | os.PathLike[str]) -> Path:
         elif not file.is_file():
             problem, cure = "this is a folder, not a file", "name a file in it"
         elif not file.stat().st_size:
-            problem, cure = "E15: the file is empty", "check that the recording was written"
+            problem, cure, code = "the file is empty", "check that the recording was written", "E15"
         else:
             with open(file, "rb"):
                 pass
     except (OSError, ValueError) as error:
         problem, cure = f"the file cannot be opened: {error}", "check its name and permissions"
     if problem:
-        raise InputError(problem, where=str(path), cure=cure)
+        raise InputError(problem, where=str(path), cure=cure, code=code)
     return file
 
 

@@ -161,7 +161,8 @@ def read(
     layout = parse_header(head.decode("utf-8", "replace"), where=where)
     if first_row is None:
         raise InputError(
-            "E15: the file has a header and no data",
+            "the file has a header and no data",
+            code="E15",
             where=where,
             evidence=f"{path.stat().st_size:,} bytes",
             cure="the solution found no fix: check its observations and options",

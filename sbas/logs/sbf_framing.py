@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from io import FileIO
-from itertools import pairwise
 from pathlib import Path
 from typing import TypeVar
 
@@ -86,53 +85,52 @@ class _Candidates:
         self.likely = sync[self.end] & (self.length <= _LIKELY_LENGTH)
         self.good = np.zeros(len(self.start), np.bool_)
         self.rows: list[tuple[NDArray[np.intp], Bytes]] = []
+        self._without_rows: list[NDArray[np.intp]] = []
 
     def check(self, index: NDArray[np.intp]) -> None:
         """Find out the CRC of some candidates, keeping the rows of the good ones."""
-        # Stable, so that groups stay in file order; keys of 16 bits are sorted by radix.
+        start, end = self.start[index] + 4, self.end[index]
+        if int((end - start).sum()) > _CROWDED * len(self.data):
+            # Heaped upon each other, as in a hostile file: each by itself would take hours.
+            good = crc16_of_spans(self.data, start, end) == self.crc[index]
+            self.good[index] = good
+            self._without_rows.append(index[good])
+            return
+        view = self.data.data
+        for group in self._groups(index):
+            if len(group) < _FEW_ROWS:
+                # Setting up whole columns would not pay.
+                spans = zip((self.start[group] + 4).tolist(), self.end[group].tolist(), strict=True)
+                crc = [crc_hqx(view[first:after], 0) for first, after in spans]
+                good = np.array(crc, np.uint16) == self.crc[group]
+                rows = self._gather(group[good]) if good.any() else None
+            else:
+                rows = self._gather(group)
+                good = crc16_of_rows(rows[:, 4:]) == self.crc[group]
+                rows = rows if good.all() else rows[good]
+            self.good[group] = good
+            if rows is not None and len(rows):
+                self.rows.append((group[good], rows))
+
+    def gather_accepted(self, chosen: NDArray[np.bool_]) -> None:
+        """Keep the rows of those accepted candidates that were checked in a heap."""
+        for index in self._without_rows:
+            self.rows += [
+                (group, self._gather(group)) for group in self._groups(index[chosen[index]])
+            ]
+
+    def _groups(self, index: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+        """Candidates by ID and length, each group in file order."""
+        # Stable, so that the order stays; keys of 16 bits are sorted by radix.
         index = index[np.argsort(self.length[index], kind="stable")]
         index = index[np.argsort(self.id[index], kind="stable")]
         ids, lengths = self.id[index], self.length[index]
         cuts = np.flatnonzero((ids[1:] != ids[:-1]) | (lengths[1:] != lengths[:-1])) + 1
-        bounds = [0, *cuts.tolist(), len(index)]
-        few: list[NDArray[np.intp]] = []
-        for low, high in pairwise(bounds):
-            group = index[low:high]
-            if high - low < _FEW_ROWS:
-                few.append(group)
-                continue
-            rows = self._gather(group)
-            good = crc16_of_rows(rows[:, 4:]) == self.crc[group]
-            self._keep(group, rows, good)
-        self._check_few(few)
-
-    def _check_few(self, groups: list[NDArray[np.intp]]) -> None:
-        """Candidates of rare kinds, where setting up whole columns would not pay."""
-        index = np.concatenate(groups) if groups else np.empty(0, np.intp)
-        start, end = self.start[index] + 4, self.end[index]
-        if int((end - start).sum()) > _CROWDED * len(self.data):
-            # Heaped upon each other, as in a hostile file: one by one would take hours.
-            good = crc16_of_spans(self.data, start, end) == self.crc[index]
-        else:
-            view = self.data.data
-            spans = zip(start.tolist(), end.tolist(), strict=True)
-            computed = [crc_hqx(view[first:after], 0) for first, after in spans]
-            good = np.array(computed, np.uint16) == self.crc[index]
-        self.good[index] = good
-        for group in groups:
-            if self.good[group].any():
-                self._keep(group, self._gather(group), self.good[group])
+        return np.split(index, cuts) if len(index) else []
 
     def _gather(self, group: NDArray[np.intp]) -> Bytes:
         rows: Bytes = sliding_window_view(self.data, int(self.length[group[0]]))[self.start[group]]
         return rows
-
-    def _keep(self, group: NDArray[np.intp], rows: Bytes, good: NDArray[np.bool_]) -> None:
-        self.good[group] = good
-        if good.all():
-            self.rows.append((group, rows))
-        elif good.any():
-            self.rows.append((group[good], rows[good]))
 
 
 def _outermost(start: Positions, end: Positions, free_from: int) -> NDArray[np.bool_]:
@@ -180,6 +178,7 @@ def frame(data: Bytes, *, offset: int = 0, commit: int | None = None, free_from:
             turn = rest
     chosen = np.zeros(len(found.start), np.bool_)
     chosen[accepted] = True
+    found.gather_accepted(chosen)
     groups = []
     for index, rows in found.rows:
         keep = chosen[index]

@@ -113,7 +113,8 @@ class TextBlocks:
                 carry = text[cut:]
                 if len(carry) > MAX_LINE_BYTES and carry.strip(b"\0"):
                     raise InputError(
-                        f"E18: no line end within {MAX_LINE_BYTES:,} bytes",
+                        f"no line end within {MAX_LINE_BYTES:,} bytes",
+                        code="E18",
                         where=f"{self.path}, near byte {skip + done - len(carry):,}",
                         evidence=f"{carry[:40]!r}",
                         cure="this is no text file of records, or its line ends are lost; "

@@ -124,13 +124,13 @@ def scale_of_stamps(
             f"times name a zone, so they are UTC, but they are said to be {asked or said}",
             where=where,
             evidence=f"column {header!r}",
-            cure="take the zone (such as Z) off the times, or say --time UTC",
+            cure="take the zone (such as Z) off the times, or say --time-scale UTC",
         )
     if by_week and scale != "GPST":
         raise InputError(
             f"week and seconds of week are GPS time, not {scale}",
             where=where,
-            cure="leave out --time, or write the times as dates",
+            cure="leave out --time-scale, or write the times as dates",
         )
     if asked and said and asked != said:
         finding = Finding(

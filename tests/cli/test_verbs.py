@@ -169,7 +169,8 @@ def test_several_files_are_one_recording(
         assert joined[key].pop("mean") == pytest.approx(alone[key].pop("mean"), rel=1e-12)
     for key in ("epochs", "hpe_m", "hpl_m", "alert_limits"):
         assert joined[key] == alone[key]
-    assert len(joined["sources"]) == 2
+    read = [s["path"] for s in joined["sources"] if s["format"] == "parquet"]
+    assert read == [str(early), str(late)]
     overlapping = Answer(capsys, "evaluate", one, early, *TRUTH)
     assert overlapping.code == 2
     assert "E14" in overlapping.err

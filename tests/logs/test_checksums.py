@@ -13,7 +13,7 @@ from sbas.logs.checksums import crc16_of_rows, crc16_of_spans, crc24q_of_rows
 
 def test_crc16_check_value_of_xmodem() -> None:
     # 0x31C3 is the published check value of CRC-16/XMODEM; a zero in front makes the length even.
-    row = np.frombuffer(b"\0123456789", np.uint8)[None, :]
+    row = np.frombuffer(b"\0" + b"123456789", np.uint8)[None, :]
     assert crc16_of_rows(row).tolist() == [0x31C3]
 
 
