@@ -25,10 +25,10 @@ from sbas.logs.column_map import (
     ellipsoidal,
     geoid_unused,
     pl_outside_sbas,
-    sentinel_findings,
 )
 from sbas.logs.format import Format, Match, Progress
 from sbas.logs.rtklib_layout import COLUMN_HEADER, Layout, fit_rows, header_text, parse_header
+from sbas.logs.sentinels import sentinel_findings
 from sbas.logs.text_input import (
     TextBlocks,
     bad_line_finding,

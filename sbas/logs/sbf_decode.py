@@ -113,12 +113,11 @@ def _count_of_satellites(raw: NDArray[Any], missing: int) -> NDArray[np.int16]:
     return np.where(raw == missing, -1, raw.astype(np.int16)).astype(np.int16)
 
 
-def _pvt(raw: Raw, want: Set[str], position: Callable[[Decoded], None]) -> Decoded:
+def _pvt(raw: Raw, want: Set[str], version_1: bool, position: Callable[[Decoded], None]) -> Decoded:
     """What all PVT blocks share; `position` adds position and velocity before the rest."""
     out = Decoded()
     position(out)
     columns = out.columns
-    version_1 = "geo_svid" in raw
     if "correction_age_s" in want:
         columns["correction_age_s"] = out.scaled("correction_age_s", raw["correction_age"], 65535)
     if "n_sv" in want:
@@ -135,7 +134,7 @@ def _pvt(raw: Raw, want: Set[str], position: Callable[[Decoded], None]) -> Decod
     for name in ("h_accuracy", "v_accuracy"):
         if f"x_{name}_m" in want and not version_1:
             columns[f"x_{name}_m"] = out.scaled(f"x_{name}_m", raw[name], 65535)
-    if "x_undulation_m" in want:
+    if "x_undulation_m" in want and "undulation" in raw:
         columns["x_undulation_m"] = out.floats("x_undulation_m", raw["undulation"])
     if "flags" in want:
         out.add_flags(Flag.TWO_DIMENSIONAL, (raw["mode"] & 0x80) != 0)
@@ -155,7 +154,7 @@ _SPEEDS = {"speed_mps", "vel_e_mps", "vel_n_mps", "vel_u_mps"}
 _PLACE = {"lat_deg", "lon_deg", "height_m"}
 
 
-def pvt_geodetic(raw: Raw, want: Set[str]) -> Decoded:
+def pvt_geodetic(raw: Raw, want: Set[str], *, version_1: bool) -> Decoded:
     """Columns from PVTGeodetic 4007 or 5904."""
 
     def position(out: Decoded) -> None:
@@ -178,7 +177,7 @@ def pvt_geodetic(raw: Raw, want: Set[str]) -> Decoded:
         if want & _SPEEDS:
             _speeds(out, want, *(out.floats(f"vel_{a}_mps", raw[f"v{a}"]) for a in "enu"))
 
-    return _pvt(raw, want, position)
+    return _pvt(raw, want, version_1, position)
 
 
 def _speeds(out: Decoded, want: Set[str], east: Floats, north: Floats, up: Floats) -> None:
@@ -188,7 +187,7 @@ def _speeds(out: Decoded, want: Set[str], east: Floats, north: Floats, up: Float
         out.columns["speed_mps"] = np.hypot(east, north)
 
 
-def pvt_cartesian(raw: Raw, want: Set[str]) -> Decoded:
+def pvt_cartesian(raw: Raw, want: Set[str], *, version_1: bool) -> Decoded:
     """Columns from PVTCartesian 4006 or 5903: geodetic on WGS 84, velocity to east-north-up."""
 
     def position(out: Decoded) -> None:
@@ -216,7 +215,7 @@ def pvt_cartesian(raw: Raw, want: Set[str]) -> Decoded:
             ecef = _cartesian(out, raw, ("vx", "vy", "vz"), _SPEEDS & want)
             _speeds(out, want, *ecef2enuv(*ecef, lat_deg, lon_deg))
 
-    return _pvt(raw, want, position)
+    return _pvt(raw, want, version_1, position)
 
 
 def _cartesian(out: Decoded, raw: Raw, names: Iterable[str], columns: Set[str]) -> list[Floats]:
@@ -247,7 +246,9 @@ def covariance_cartesian(raw: Raw, want: Set[str], lat_deg: Floats, lon_deg: Flo
     """
     out = Decoded()
     pairs = ("xx", "yy", "zz", "xy", "xz", "yz")
-    columns = {name for name in want if name in _COVARIANCE}
+    columns = _COVARIANCE & want
+    if not columns:
+        return out
     c = dict(zip(pairs, _cartesian(out, raw, pairs, columns), strict=True))
     c |= {pair[::-1]: value for pair, value in c.items()}
     sin_lat, cos_lat = np.sin(np.radians(lat_deg)), np.cos(np.radians(lat_deg))

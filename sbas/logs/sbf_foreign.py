@@ -38,6 +38,7 @@ class Foreign:
     nmea_sentences: int = 0
     rtcm_frames: int = 0
     first_orphans: list[int] = field(default_factory=list)
+    orphan_end: int = -1
 
 
 def _nmea_spans(data: bytes) -> list[tuple[int, int]]:
@@ -125,9 +126,11 @@ def _count(data: bytes, offset: int, found: Foreign, commit: int) -> int:
 
 
 def _orphans(count: int, offset: int, found: Foreign) -> None:
-    found.orphan_bytes += count
-    if count and len(found.first_orphans) < _OFFSETS_KEPT:
+    if count and offset != found.orphan_end and len(found.first_orphans) < _OFFSETS_KEPT:
         found.first_orphans.append(offset)
+    if count:
+        found.orphan_bytes += count
+        found.orphan_end = offset + count
 
 
 def cut_block(path: Path, start: int, end: int) -> tuple[int, int] | None:

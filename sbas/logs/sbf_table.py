@@ -161,7 +161,9 @@ class _Build:
         if "alert_flag" in fields:
             self.alert[at] = fields["alert_flag"]
         geodetic = number in (sbf.PVT_GEODETIC, sbf.PVT_GEODETIC_V1)
-        return (decode.pvt_geodetic if geodetic else decode.pvt_cartesian)(fields, self.want)
+        version_1 = number in (sbf.PVT_GEODETIC_V1, sbf.PVT_CARTESIAN_V1)
+        decoder = decode.pvt_geodetic if geodetic else decode.pvt_cartesian
+        return decoder(fields, self.want, version_1=version_1)
 
     def decode_covariance(self, number: int, fields: Raw, row: Rows) -> decode.Decoded:
         if number == sbf.COV_GEODETIC:

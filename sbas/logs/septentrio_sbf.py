@@ -44,24 +44,24 @@ FILLED = (
 of its geoid model."""
 
 _PVT_FIELDS: dict[str, tuple[str, ...]] = {
-    "lat_deg": ("lat", "x", "y", "z", "error"), "lon_deg": ("lon", "x", "y", "z", "error"),
-    "height_m": ("height", "x", "y", "z", "error"),
+    "lat_deg": ("lat", "x", "y", "z"), "lon_deg": ("lon", "x", "y", "z"),
+    "height_m": ("height", "x", "y", "z"),
     **dict.fromkeys(("speed_mps", "vel_e_mps", "vel_n_mps", "vel_u_mps"),
-                    ("vn", "ve", "vu", "vx", "vy", "vz", "x", "y", "z", "error")),
-    "n_sv": ("n_sv",), "mode": ("mode", "error", "wa_corr_info"),
+                    ("vn", "ve", "vu", "vx", "vy", "vz", "x", "y", "z")),
+    "n_sv": ("n_sv",), "mode": ("mode", "wa_corr_info"),
     "geo_prn": ("mode", "geo_svid", "reference_id"),
     "correction_age_s": ("correction_age",),
-    "flags": ("mode", "error", "lat", "lon", "x", "y", "z", "alert_flag"),
+    "flags": ("mode", "lat", "lon", "x", "y", "z", "alert_flag"),
     "x_h_accuracy_m": ("h_accuracy",), "x_v_accuracy_m": ("v_accuracy",),
     "x_undulation_m": ("undulation",),
     "hpl_m": ("signal_info",), "vpl_m": ("signal_info",),
 }  # fmt: skip
 _CARTESIAN_COVARIANCE = ("xx", "yy", "zz", "xy", "xz", "yz")
 _COVARIANCE_FIELDS: dict[str, tuple[str, ...]] = {
-    "sigma_e_m": ("ee", "error", *_CARTESIAN_COVARIANCE),
-    "sigma_n_m": ("nn", "error", *_CARTESIAN_COVARIANCE),
-    "sigma_u_m": ("uu", "error", *_CARTESIAN_COVARIANCE),
-    "cov_en_m2": ("ne", "error", *_CARTESIAN_COVARIANCE),
+    "sigma_e_m": ("ee", *_CARTESIAN_COVARIANCE),
+    "sigma_n_m": ("nn", *_CARTESIAN_COVARIANCE),
+    "sigma_u_m": ("uu", *_CARTESIAN_COVARIANCE),
+    "cov_en_m2": ("ne", *_CARTESIAN_COVARIANCE),
 }
 _DILUTION_FIELDS: dict[str, tuple[str, ...]] = {
     "hdop": ("hdop",), "vdop": ("vdop",), "pdop": ("pdop",), "n_sv": ("n_sv",),
@@ -167,9 +167,10 @@ def read_in_chunks(
 def _plan(want: set[str]) -> dict[int, tuple[str, ...]]:
     """Fields to keep of each block number."""
     by_kind = (_PVT_FIELDS, _COVARIANCE_FIELDS, _DILUTION_FIELDS, _RAIM_FIELDS)
+    always: tuple[set[str], ...] = ({"error"}, {"error"}, set(), set())
     plan: dict[int, tuple[str, ...]] = {}
-    for numbers, fields in zip(KINDS, by_kind, strict=True):
-        names = {name for column in want for name in fields.get(column, ())}
+    for numbers, fields, minimum in zip(KINDS, by_kind, always, strict=True):
+        names = {name for column in want for name in fields.get(column, ())} | minimum
         for number in numbers:
             plan[number] = tuple(sorted(names & sbf.BLOCKS[number].fields.keys()))
     plan[sbf.PVT_GEODETIC] += ("datum",)
@@ -300,7 +301,7 @@ def _frame_table(raw: Mapping[int, Raw]) -> pd.DataFrame | None:
 
 FORMAT = Format(
     name="septentrio_sbf",
-    extensions=(".sbf", ".log"),
+    extensions=(".sbf",),
     description="Septentrio SBF receiver log, CRC-checked, with raw SBAS frames",
     sniff=sniff,
     read=read,

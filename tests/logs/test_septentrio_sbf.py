@@ -536,6 +536,9 @@ class TestLeftovers:
         r = load(epoch(0), NMEA * 500, b"!" * 7, NMEA * 300, epoch(1000), NMEA * 3)
         assert finding(r, "E24").evidence.startswith("7 of ")
         assert "803 NMEA" in finding(r, "E24").evidence
+        r = load(epoch(0), b"!" * 9000, NMEA, b"!", epoch(1000))
+        first = len(epoch(0))
+        assert finding(r, "E24").where == f"first at byte {first}, {first + 9000 + len(NMEA):,}"
 
 
 def test_receiver_time(load) -> None:  # type: ignore[no-untyped-def]

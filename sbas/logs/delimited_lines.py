@@ -1,0 +1,165 @@
+"""The lines of a delimited text, block by block, as columns with readable times."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from sbas.exceptions import InputError
+from sbas.logs.column_map import (
+    TIME_PARTS,
+    MappedColumn,
+    map_headers,
+    needed_columns,
+)
+from sbas.logs.delimited_layout import Layout, data_rows
+from sbas.logs.text_input import (
+    collapse_blanks,
+    parse_lines,
+    plain_blanks,
+)
+from sbas.logs.time_stamps import (
+    Stamps,
+    parse_date_and_clock,
+    parse_stamps,
+    week_stamps,
+)
+
+_TEXT_COLUMNS = ("time", "date", "mode", "environment", "hardware_fault")
+_COMMENT_LINE = re.compile(rb"^[ \t]*[#%][^\n]*\n?", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Part:
+    """One block's lines with a readable time."""
+
+    stamps: Stamps
+    numbers: dict[str, NDArray[np.float64]]
+    texts: dict[str, Any]
+    bad_lines: int
+    example: str
+    unreadable: dict[str, int] = field(default_factory=dict)
+    words: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class LineReader:
+    """What every block of a file is read with."""
+
+    layout: Layout
+    mapped: Mapping[str, MappedColumn]
+    others: Mapping[str, MappedColumn]
+    wanted: tuple[str, ...]
+    where: str
+
+    @classmethod
+    def of(
+        cls, layout: Layout, columns: Collection[str] | None, extra: Collection[str], where: str
+    ) -> LineReader:
+        mapped, others = map_headers(layout.headers, where=where, extra=extra)
+        has_week = "week" in mapped and "tow" in mapped
+        if "time" in mapped and has_week:
+            raise InputError(
+                "two columns say the time",
+                where=where,
+                evidence=f"{mapped['time'].header!r} beside week and seconds of week",
+                cure="take one of them out, or rename it to 'x_time'",
+            )
+        if "time" not in mapped and not has_week:
+            lonely = [mapped[name].header for name in TIME_PARTS if name in mapped]
+            raise InputError(
+                "no column gives the time",
+                where=where,
+                evidence=f"columns {', '.join(h.strip() for h in layout.headers)[:300]}"
+                + (f"; {', '.join(lonely)} alone is not enough" if lonely else ""),
+                cure="name the time column 'time' (GPS time) or 'utc', or give 'week' and 'tow'",
+            )
+        names = needed_columns(columns, mapped, others)
+        return cls(layout, mapped, others, names, where)
+
+    def check_decimals(self, sample: str) -> None:
+        """E20 where decimal commas meet decimal points, or a delimiter that is a comma."""
+        rows = data_rows(sample, self.layout)
+        numeric = [
+            self._column(name).index
+            for name in self.wanted
+            if name not in _TEXT_COLUMNS and not name.startswith("x_")
+        ]
+        cells = [row[i] for row in rows for i in numeric if i < len(row)]
+        commas = [c for c in cells if re.fullmatch(r"\s*[+-]?\d+,\d+\s*", c)]
+        points = [c for c in cells if re.fullmatch(r"\s*[+-]?\d*\.\d+\s*", c)]
+        if commas and (points or self.layout.delimiter in " ,"):
+            raise InputError(
+                "decimal comma and decimal point in one file"
+                if points
+                else "decimal commas, with blanks or commas between the fields",
+                code="E20",
+                where=self.where,
+                evidence=", ".join([*commas[:2], *points[:2]]),
+                cure="write all numbers with a decimal point, or separate fields by ';' and "
+                "write all with a comma",
+            )
+
+    def _column(self, name: str) -> MappedColumn:
+        return self.mapped[name] if name in self.mapped else self.others[name]
+
+    def block(self, block: bytes) -> Part:
+        """Columns of one block of lines; lines without a readable time are left out."""
+        if b"#" in block or b"%" in block:
+            block = _COMMENT_LINE.sub(b"", block)
+        if self.layout.delimiter == " ":
+            block = collapse_blanks(plain_blanks(block))
+        times = tuple(name for name in TIME_PARTS if name in self.mapped)
+        index = {name: str(self._column(name).index) for name in (*times, *self.wanted)}
+        texts = [index[name] for name in index if name in _TEXT_COLUMNS or name.startswith("x_")]
+        fields = parse_lines(
+            block,
+            [str(i) for i in range(len(self.layout.headers))],
+            texts=texts,
+            wanted=list(index.values()),
+            delimiter=self.layout.delimiter,
+            decimal=self.layout.decimal,
+        )
+        back = {i: name for name, i in index.items()}
+        numbers = {back[i]: v for i, v in fields.numbers.items()}
+        text = {back[i]: v for i, v in fields.texts.items()}
+        unreadable = {back[i]: v for i, v in fields.unreadable.items()}
+        stamps = self._stamps(numbers, text)
+        bad, example = fields.bad_lines, fields.first_bad
+        good = stamps.readable
+        if not good.all():
+            if not example:
+                at = int(np.argmin(good))
+                shown = [text[n][at].as_py() if n in text else numbers[n][at] for n in times]
+                example = f"time {' '.join(map(str, shown))}"
+            bad += int(np.count_nonzero(~good))
+            stamps = stamps[good]
+            mask = pa.array(good)
+            numbers = {name: v[good] for name, v in numbers.items()}
+            text = {name: v.filter(mask) for name, v in text.items()}
+            unreadable = {name: v[good] for name, v in unreadable.items()}
+        return Part(
+            stamps,
+            {name: v for name, v in numbers.items() if name not in TIME_PARTS},
+            {name: v for name, v in text.items() if name not in TIME_PARTS},
+            bad,
+            example,
+            {n: int(np.count_nonzero(v)) for n, v in unreadable.items() if n not in TIME_PARTS},
+            {back[i]: n for i, n in fields.words.items() if back[i] not in TIME_PARTS},
+        )
+
+    def _stamps(
+        self, numbers: Mapping[str, NDArray[np.float64]], text: Mapping[str, Any]
+    ) -> Stamps:
+        if "time" not in self.mapped:
+            return week_stamps(numbers["week"], numbers["tow"] * self.mapped["tow"].factor)
+        if "date" not in self.mapped:
+            return parse_stamps(text["time"])
+        whole = parse_stamps(text["time"])
+        return whole if whole.readable.any() else parse_date_and_clock(text["date"], text["time"])
