@@ -22,3 +22,9 @@ def test_a_notebook_runs(notebook: Path, tmp_path: Path) -> None:
     spec.loader.exec_module(module)
     module.execute(notebook, tmp_path / notebook.name)
     assert "Traceback" not in (tmp_path / notebook.name).read_text(encoding="utf-8")
+
+
+def test_every_picture_of_the_notebook_was_seen_once() -> None:
+    for path in NOTEBOOKS:
+        text = path.read_text(encoding="utf-8")
+        assert text.count('"image/png"') == text.count("sbas.plots.") > 0, path.name

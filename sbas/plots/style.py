@@ -110,16 +110,15 @@ def drawing(given: Sequence[Axes] | None, sheet: Sheet) -> Iterator[list[Axes]]:
     A figure is made without pyplot, so that none stays behind; in a notebook pyplot makes it,
     since only its figures show themselves below the cell.
     """
-    with house_style():
-        if given is None:
-            figure = None
-            if _in_notebook():
-                from matplotlib import pyplot
+    figure = None
+    if given is None and _in_notebook():
+        from matplotlib import pyplot
 
-                figure = pyplot.figure(figsize=(sheet.width, sheet.height))
-            axes = list(sheet.axes(figure))
-        else:
-            axes = list(given)
+        # Outside the style: the notebook mode that a first figure switches on must outlive it.
+        size = (sheet.width, sheet.height)
+        figure = pyplot.figure(figsize=size, dpi=RC["figure.dpi"], facecolor="white")
+    with house_style():
+        axes = list(sheet.axes(figure)) if given is None else list(given)
         for ax in axes:
             # Ticks are made when drawn, perhaps outside this context: their look is fixed here.
             ax.tick_params(
