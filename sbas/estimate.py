@@ -11,6 +11,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Literal, NoReturn
 
+from sbas.numerals import downward, number, percent, upward
+
 Evidence = Literal["demonstrated", "modelled", "claimed"]
 
 
@@ -23,6 +25,10 @@ class Counted:
     of: str = "events"
 
     evidence = "demonstrated"
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.events < math.inf and 0 <= self.hours < math.inf):
+            raise ValueError(f"a count and its hours are 0 or more: {self.events}, {self.hours}")
 
     def __str__(self) -> str:
         return f"{self.events:g} {self.of} in {self.hours:.6g} h"
@@ -37,6 +43,10 @@ class Fitted:
     extrapolation_factor: float
 
     evidence = "modelled"
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.extrapolation_factor):
+            raise ValueError(f"an extrapolation factor is finite: {self.extrapolation_factor}")
 
     def __str__(self) -> str:
         values = ", ".join(f"{k} {v:.4g}" for k, v in self.parameters.items())
@@ -94,9 +104,15 @@ class Estimate:
     def __post_init__(self) -> None:
         if not math.isfinite(self.value):
             raise ValueError(f"an estimate has a finite value, not {self.value}")
-        bounded = self.lower is not None or self.upper is not None
-        if bounded and not (self.confidence is not None and 0 < self.confidence < 1):
-            raise ValueError(f"bounds need a confidence in (0, 1), not {self.confidence}")
+        bounds = [bound for bound in (self.lower, self.upper) if bound is not None]
+        if not all(map(math.isfinite, bounds)):
+            raise ValueError(f"a bound is finite or None: {self.lower}, {self.upper}")
+        if self.confidence is None and bounds:
+            raise ValueError("bounds need a confidence")
+        if self.confidence is not None and not 0 < self.confidence < 1:
+            raise ValueError(f"a confidence lies in (0, 1): {self.confidence}")
+        if self.sided == "two" and len(bounds) == 1:
+            raise ValueError("a two-sided interval has both bounds")
         low = -math.inf if self.lower is None else self.lower
         high = math.inf if self.upper is None else self.upper
         if not low <= self.value <= high:
@@ -129,14 +145,17 @@ class Estimate:
 
     def __str__(self) -> str:
         unit = {"1": "", "per_h": "/h"}.get(self.unit, f" {self.unit}")
-        text = f"{self.value:.4g}{unit}"
-        bounds = {"upper": self.upper, "lower": self.lower}
+        # A value without its bound stands for it, and is then rounded to the safe side too.
+        bare = {"upper": upward, "lower": downward, "two": number}[self.sided]
+        text = f"{(bare if self.confidence is None else number)(self.value)}{unit}"
         if self.sided == "two" and self.lower is not None and self.upper is not None:
-            text += f" [{self.lower:.4g}, {self.upper:.4g}]"
-        elif (bound := bounds.get(self.sided)) is not None:
-            text += f" ({self.sided} bound {bound:.4g}{unit})"
+            text += f" [{downward(self.lower)}, {upward(self.upper)}]"
+        elif self.sided == "upper" and self.upper is not None:
+            text += f" (upper bound {upward(self.upper)}{unit})"
+        elif self.sided == "lower" and self.lower is not None:
+            text += f" (lower bound {downward(self.lower)}{unit})"
         if self.confidence is not None:
-            text += f" at {100 * self.confidence:.12g} %"
+            text += f" at {percent(self.confidence)}"
         return f"{text}, {self.evidence}: {self.basis}"
 
     def _repr_html_(self) -> str:

@@ -19,12 +19,13 @@ CODES: dict[str, str] = {
     "E03": "latitude and longitude look like radians",
     "E04": "gaps in the recording",
     "E05": "epochs with the same time",
+    "E06": "several receivers or definitions in one recording",
     "E07": "sentinel values mapped to missing",
     "E08": "values in another unit than stated",
-    "E09": "offset that looks like a height, antenna or datum error",
+    "E09": "uncertain truth",
     "E10": "epochs or records incomplete",
     "E12": "positions far from the truth",
-    "E13": "protection level frozen, zero or negative",
+    "E13": "protection level zero or negative",
     "E14": "time goes backward",
     "E15": "too few epochs",
     "E16": "format not recognised",
@@ -36,6 +37,7 @@ CODES: dict[str, str] = {
     "E24": "bytes that belong to no valid block",
     "E25": "metadata missing, unreadable or contradicted",
     "E26": "values converted, or repaired on request, and counted",
+    "E27": "more than one sampling rate",
 }
 """Every finding code with its short title."""
 

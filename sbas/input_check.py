@@ -1,92 +1,27 @@
 """Can this recording be trusted? Structure, time order, gaps, positions and levels.
 
-`survey` looks at a source once (batch by batch) and states facts; `check` turns facts into
-findings; `repair` makes, on request only, what a cure names, and counts it.
+`check` turns the facts of a survey into findings; `repair` makes, on request only, what a cure
+names, and counts it.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-import pandas as pd
 import pymap3d
-from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
 from sbas.recording import EpochSource, Recording
-from sbas.streaming import Distribution
+from sbas.recording_survey import Survey, survey
 from sbas.timescales import NS_PER_S
 from sbas.truth import FixedPoint, Truth
 
-GAP_STEPS = 1.5
-"""A step longer than this many median steps is a gap."""
-STATIC_EXTENT_M = 20.0
-"""Medians of 60 epochs that stay within this range, east and north, make a recording static."""
-STATIC_BLOCK_EPOCHS = 60
-ACCEPTABLE = ("E08", "E10", "E12", "E24")
+ACCEPTABLE = ("E06", "E10", "E12", "E24")
 """Errors that a user may accept by name; the others would make figures meaningless."""
-
-Ints = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Gaps:
-    """(g,) gaps: the row that follows each, the last epoch before it and the first one after."""
-
-    row: Ints
-    before_ns: Ints
-    after_ns: Ints
-
-    def __len__(self) -> int:
-        return self.row.size
-
-    def missing_ns(self, interval_ns: int) -> Ints:
-        """(g,) time that no epoch covers [ns]."""
-        return self.after_ns - self.before_ns - interval_ns
-
-
-@dataclass(frozen=True, eq=False)
-class Survey:
-    """Facts of a recording, found in one look.
-
-    Times in ns of GPS time; `interval_ns` is the median step. `median_position` is (lat_deg,
-    lon_deg, height_m), each the median of its own; `extent_m` the larger range, east or north,
-    of the medians of 60 epochs.
-    """
-
-    epochs: int
-    begin_ns: int
-    end_ns: int
-    interval_ns: int
-    gaps: Gaps
-    repeated: int
-    repeated_differing: int
-    first_repeated_row: int
-    backward: int
-    first_backward_row: int
-    positions: int
-    median_position: tuple[float, float, float]
-    extent_m: float
-    lat_range_deg: tuple[float, float]
-    lon_range_deg: tuple[float, float]
-    out_of_range: int
-    levels: int
-    median_hpl_m: float
-    levels_not_positive: int
-
-    @property
-    def static(self) -> bool:
-        return self.positions > 0 and self.extent_m < STATIC_EXTENT_M
-
-    @property
-    def hours(self) -> float:
-        """Recorded hours: epochs times the interval, gaps not included."""
-        return self.epochs * self.interval_ns / (3600 * NS_PER_S)
 
 
 @dataclass(frozen=True)
@@ -116,139 +51,6 @@ class CheckResult:
             "usable": self.usable,
             "findings": [f.to_dict() for f in self.findings],
         }
-
-
-def sampling_interval_ns(source: EpochSource) -> int:
-    """Median of the steps forward between successive epochs [ns]; 0 when there is none."""
-    steps: Counter[int] = Counter()
-    previous = np.empty(0, np.int64)
-    for batch in source.batches(()):
-        time = np.concatenate([previous, batch.index.to_numpy().astype(np.int64)])
-        forward = np.diff(time)
-        values, counts = np.unique(forward[forward > 0], return_counts=True)
-        steps.update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
-        previous = time[-1:]
-    if not steps:
-        return 0
-    values = np.array(sorted(steps))
-    ends = np.cumsum([steps[v] for v in values.tolist()])
-    return int(values[np.searchsorted(ends, (ends[-1] + 1) // 2)])
-
-
-def survey(source: EpochSource) -> Survey:
-    """Look at every epoch of a source once, after one look at its times."""
-    interval_ns = sampling_interval_ns(source)
-    max_step_ns = int(GAP_STEPS * interval_ns)
-    rows = repeated = differing = backward = positions = out_of_range = not_positive = 0
-    first_repeated = first_backward = -1
-    begin_ns = end_ns = 0
-    gap_rows: list[Ints] = []
-    gap_before: list[Ints] = []
-    gap_after: list[Ints] = []
-    level = Distribution()
-    offsets = [Distribution(), Distribution(), Distribution()]
-    reference: tuple[float, float, float] | None = None
-    block_low, block_high = np.full(2, np.inf), np.full(2, -np.inf)
-    ranges = np.array([[np.inf, -np.inf], [np.inf, -np.inf]])
-    tail: pd.DataFrame | None = None
-    for batch in source.batches(_SURVEYED):
-        if len(batch) == 0:
-            continue
-        joined = batch if tail is None else pd.concat([tail, batch])
-        time = joined.index.to_numpy().astype(np.int64)
-        offset = rows - (0 if tail is None else 1)
-        step = np.diff(time)
-        same, back, gap = step == 0, step < 0, step > max_step_ns
-        if same.any():
-            if first_repeated < 0:
-                first_repeated = offset + int(np.argmax(same)) + 1
-            repeated += int(same.sum())
-            values = joined.to_numpy()
-            a, b = values[:-1][same], values[1:][same]
-            differing += int(np.sum(np.any((a != b) & ~(np.isnan(a) & np.isnan(b)), axis=1)))
-        if back.any():
-            if first_backward < 0:
-                first_backward = offset + int(np.argmax(back)) + 1
-            backward += int(back.sum())
-        if gap.any():
-            at = np.flatnonzero(gap)
-            gap_rows.append(at + 1 + offset)
-            gap_before.append(time[at])
-            gap_after.append(time[at + 1])
-        begin_ns = int(time[0]) if rows == 0 else begin_ns
-        end_ns = int(time[-1])
-        rows += len(batch)
-        tail = batch.iloc[-1:]
-
-        hpl = batch["hpl_m"].to_numpy()
-        level.update(hpl)
-        not_positive += int(np.sum(hpl <= 0)) + int(np.sum(batch["vpl_m"].to_numpy() <= 0))
-        position = batch[list(_POSITION)].to_numpy()
-        known = np.isfinite(position[:, :2]).all(axis=1)
-        lat, lon = position[:, 0], position[:, 1]
-        wrong = known & ((np.abs(lat) > 90) | (np.abs(lon) > 180))
-        out_of_range += int(wrong.sum())
-        known &= ~wrong
-        if not known.any():
-            continue
-        positions += int(known.sum())
-        for i, axis in enumerate((lat[known], lon[known])):
-            ranges[i] = min(ranges[i, 0], axis.min()), max(ranges[i, 1], axis.max())
-        if reference is None:
-            lat0, lon0, height0 = position[known][0]
-            reference = (lat0, lon0, height0 if np.isfinite(height0) else 0.0)
-        height = np.where(np.isfinite(position[:, 2]), position[:, 2], reference[2])
-        east, north, up = pymap3d.geodetic2enu(lat[known], lon[known], height[known], *reference)
-        up = np.where(np.isfinite(position[known, 2]), up, np.nan)
-        for seen, values in zip(offsets, (east, north, up), strict=True):
-            seen.update(values)
-        medians = _block_medians(np.column_stack([east, north]))
-        block_low = np.minimum(block_low, medians.min(axis=0))
-        block_high = np.maximum(block_high, medians.max(axis=0))
-
-    median = (np.nan, np.nan, np.nan)
-    if reference is not None:
-        east, north, up = (d.quantile(0.5) for d in offsets)
-        lat, lon, height = pymap3d.enu2geodetic(east, north, np.nan_to_num(up), *reference)
-        median = (float(lat), float(lon), float(height) if np.isfinite(up) else np.nan)
-    return Survey(
-        epochs=rows,
-        begin_ns=begin_ns,
-        end_ns=end_ns,
-        interval_ns=interval_ns,
-        gaps=Gaps(*(_joined(parts) for parts in (gap_rows, gap_before, gap_after))),
-        repeated=repeated,
-        repeated_differing=differing,
-        first_repeated_row=first_repeated,
-        backward=backward,
-        first_backward_row=first_backward,
-        positions=positions,
-        median_position=median,
-        extent_m=float(np.max(block_high - block_low)) if positions else np.nan,
-        lat_range_deg=(float(ranges[0, 0]), float(ranges[0, 1])),
-        lon_range_deg=(float(ranges[1, 0]), float(ranges[1, 1])),
-        out_of_range=out_of_range,
-        levels=level.count,
-        median_hpl_m=level.quantile(0.5),
-        levels_not_positive=not_positive,
-    )
-
-
-_POSITION = ("lat_deg", "lon_deg", "height_m")
-_SURVEYED = (*_POSITION, "hpl_m", "vpl_m")
-
-
-def _joined(parts: Sequence[Ints]) -> Ints:
-    return np.concatenate(parts) if parts else np.empty(0, np.int64)
-
-
-def _block_medians(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(b, 2) medians of successive blocks of epochs; a short batch is one block."""
-    blocks = max(len(values) // STATIC_BLOCK_EPOCHS, 1)
-    size = min(STATIC_BLOCK_EPOCHS, len(values))
-    medians = [np.median(values[: blocks * size].reshape(blocks, size, 2), axis=1)]
-    medians.append(np.median(values[-size:], axis=0)[None])
-    return np.concatenate(medians)
 
 
 def check(source: EpochSource, *, truth: Truth | None = None) -> CheckResult:
@@ -298,6 +100,14 @@ def _structure(facts: Survey) -> Iterable[Finding]:
             "E14", "error", "no epoch is later than the one before it",
             cure="--sort, or read another file",
         )  # fmt: skip
+    counted_ns = facts.epochs * facts.interval_ns
+    if abs(facts.covered_ns - counted_ns) > 0.01 * counted_ns:
+        yield Finding(
+            "E27", "warning", "epochs come at more than one rate",
+            evidence=f"{facts.epochs:,} epochs cover {facts.covered_ns / NS_PER_S:.6g} s, at the "
+            f"median step they would cover {counted_ns / NS_PER_S:.6g} s",
+            cure="hours are counted by the time covered; evaluate each rate on its own",
+        )  # fmt: skip
     if len(facts.gaps):
         missing = facts.gaps.missing_ns(facts.interval_ns) / NS_PER_S
         share = missing.sum() / ((facts.end_ns - facts.begin_ns) / NS_PER_S)
@@ -344,7 +154,7 @@ def _against_point(facts: Survey, truth: FixedPoint) -> Iterable[Finding]:
         for name, place in tries.items()
         if abs(place[0]) <= 90
     }
-    limit_km = 1 if facts.static else 1000
+    limit_km = 1 if facts.static else 100
     if distance["as given"] > limit_km:
         listed = ", ".join(f"{name} {km:.4g} km" for name, km in distance.items())
         yield Finding(

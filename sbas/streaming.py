@@ -106,9 +106,13 @@ class Distribution:
         if self._cells is None:
             return float(np.quantile(np.concatenate(self._kept), q))
         ends = np.cumsum(self._counts)
-        cell = self._cells[np.searchsorted(ends, q * (self.count - 1), side="right")]
-        middle = (float(cell) + 0.5) * self.resolution
-        return min(max(middle, self.min), self.max)
+        rank = q * (self.count - 1)
+        low, high = (
+            float(self._cells[np.searchsorted(ends, r, side="right")])
+            for r in (math.floor(rank), math.ceil(rank))
+        )
+        middle = low + (rank - math.floor(rank)) * (high - low) + 0.5
+        return min(max(middle * self.resolution, self.min), self.max)
 
 
 def _occupied(cells: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -22,6 +22,9 @@ Floats = NDArray[np.float64]
 UNSTATED_FRAME_SIGMA_M = 1.0
 """Allowed for a truth without a stated frame: ITRF and ETRS89 part by 2.5 cm a year since 1989."""
 
+MOST_ACCELERATION_MPS2 = 10.0
+"""No vehicle on rails or roads is accelerated more; bounds the bend of an interpolation."""
+
 
 class TruePosition(NamedTuple):
     """True antenna positions at (n,) epochs; NaN where the truth does not reach."""
@@ -67,13 +70,7 @@ class FixedPoint:
                 evidence=f"latitude {self.lat_deg}, longitude {self.lon_deg} [deg]",
                 cure="give --truth LAT,LON,HEIGHT in decimal degrees and metres",
             )
-        for name in ("height_m", "antenna_height_m"):
-            if not abs(getattr(self, name)) < 20_000:
-                raise InputError(
-                    f"the truth's {name} is out of range",
-                    evidence=f"{getattr(self, name)} m",
-                    cure="give metres above the ellipsoid",
-                )
+        _check_heights(height_m=self.height_m, antenna_height_m=self.antenna_height_m)
         if not (0 <= self.sigma_h_m < 1e6 and 0 <= self.sigma_v_m < 1e6):
             raise InputError("the uncertainty of the truth must be 0 m or more")
 
@@ -94,6 +91,16 @@ class FixedPoint:
             float(np.hypot(self.sigma_v_m, extra)),
         )
         return TruePosition(*(np.broadcast_to(v, time.shape) for v in values))
+
+
+def _check_heights(**heights_m: float) -> None:
+    for name, value in heights_m.items():
+        if not abs(value) < 20_000:
+            raise InputError(
+                f"the truth's {name} is out of range",
+                evidence=f"{value} m",
+                cure="give metres above the ellipsoid",
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +151,13 @@ class Trajectory:
                 where=f"after point {int(np.argmax(steps <= 0)) + 1}",
                 cure="sort it and keep one point a time",
             )
-        if not self.max_step_s > 0:
+        if not 0 < self.max_step_s < np.inf:
             raise InputError("max_step_s must be above 0 s", evidence=f"{self.max_step_s}")
+        _check_heights(antenna_height_m=self.antenna_height_m)
+        sigmas = [self.sigma_h_m, self.sigma_v_m]
+        sigmas += [v for n in ("sigma_h_m", "sigma_v_m") if n in self.table for v in self.table[n]]
+        if not all(sigma >= 0 for sigma in sigmas if not np.isnan(sigma)):
+            raise InputError("the uncertainty of the truth must be 0 m or more")
 
     @property
     def _time_ns(self) -> NDArray[np.int64]:
@@ -158,9 +170,13 @@ class Trajectory:
     def at(self, time: NDArray[np.datetime64]) -> TruePosition:
         """True positions at (n,) epochs: cubic in ECEF between points at most `max_step_s` apart.
 
-        The sigma at an interpolated epoch is the larger one of its two neighbours.
+        The cubic keeps the shape of its points (Fritsch and Carlson 1980), so that noise on two
+        of them makes no overshoot, as a spline's would; where it leaves the chord farther than
+        an acceleration of `MOST_ACCELERATION_MPS2` can (a h^2 / 8), the chord stands. The sigma
+        at an epoch is the larger one of its two neighbours', and the distance from the chord,
+        which bounds what the interpolation may have invented.
         """
-        from scipy.interpolate import CubicSpline  # loaded only where a trajectory is used
+        from scipy.interpolate import PchipInterpolator  # loaded only for trajectories
 
         knots = self._time_ns
         epochs = np.asarray(time, "M8[ns]").astype(np.int64)
@@ -168,6 +184,7 @@ class Trajectory:
             pymap3d.geodetic2ecef(*(self.table[c].to_numpy(float) for c in _POSITION))
         )
         result = np.full((epochs.size, 3), np.nan)
+        bend_m = np.zeros(epochs.size)
         known = np.isfinite(ecef).all(axis=1)
         steps = np.diff(knots)
         joined = (steps <= self.max_step_s * NS_PER_S) & known[1:] & known[:-1]
@@ -188,17 +205,21 @@ class Trajectory:
             # Seconds from the segment's start: exact to nanoseconds for a year.
             x = (knots[nodes] - knots[nodes[0]]) / NS_PER_S
             at = (epochs[rows] - knots[nodes[0]]) / NS_PER_S
-            if nodes.size < 4:
-                result[rows] = np.column_stack([np.interp(at, x, ecef[nodes, i]) for i in range(3)])
-            else:
-                result[rows] = CubicSpline(x, ecef[nodes])(at)
+            chord = np.column_stack([np.interp(at, x, ecef[nodes, i]) for i in range(3)])
+            cubic = chord if nodes.size < 3 else PchipInterpolator(x, ecef[nodes])(at)
+            bend = np.linalg.norm(cubic - chord, axis=1)
+            step_s = (knots[right[rows]] - knots[left[rows]]) / NS_PER_S
+            most = MOST_ACCELERATION_MPS2 * step_s**2 / 8
+            result[rows] = np.where((bend <= most)[:, None], cubic, chord)
+            bend_m[rows] = np.minimum(bend, most)
         lat, lon, height = pymap3d.ecef2geodetic(*result.T)
         extra = 0.0 if self.frame else UNSTATED_FRAME_SIGMA_M
         sigmas = []
         for name in ("sigma_h_m", "sigma_v_m"):
-            fallback = np.full(knots.size, getattr(self, name))
-            own = self.table[name].to_numpy(float) if name in self.table else fallback
-            larger = np.maximum(own[left], own[right])
+            usual = np.full(knots.size, getattr(self, name))
+            own = self.table[name].to_numpy(float) if name in self.table else usual
+            own = np.where(np.isfinite(own), own, usual)
+            larger = np.hypot(np.maximum(own[left], own[right]), bend_m)
             sigmas.append(np.where(np.isnan(result[:, 0]), np.nan, np.hypot(larger, extra)))
         height = np.asarray(height) + self.antenna_height_m
         return TruePosition(np.asarray(lat), np.asarray(lon), height, *sigmas)

@@ -14,9 +14,9 @@ import sbas
 PACKAGE = Path(sbas.__file__).parent
 
 LAYERS = (
-    "version", "exceptions", "findings", "timescales", "estimate", "recording", "bundled",
-    "streaming", "truth", "input_check", "logs", "laboratory", "integrity", "plots", "reporting",
-    "cli",
+    "version", "numerals", "exceptions", "findings", "timescales", "estimate", "recording",
+    "bundled", "streaming", "recording_survey", "truth", "input_check", "logs", "laboratory",
+    "integrity", "plots", "reporting", "cli",
 )  # fmt: skip
 """From the ground up: a module imports only from its own layer and those before it."""
 

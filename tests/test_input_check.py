@@ -8,8 +8,9 @@ import pytest
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding, refuse_on_errors
-from sbas.input_check import accept, check, repair, sampling_interval_ns, survey
+from sbas.input_check import accept, check, repair
 from sbas.recording import Recording
+from sbas.recording_survey import sampling_interval_ns, survey
 from sbas.truth import FixedPoint
 from tests.examples import POINT, quiet, recording
 
@@ -148,3 +149,28 @@ def test_errors_can_be_accepted_by_name_only() -> None:
     assert "accepted" in accepted.message
     with pytest.raises(InputError, match="cannot be accepted"):
         accept([damage], ["E14"])
+
+
+def test_static_does_not_hang_on_the_cut_nor_on_shortness(monkeypatch: pytest.MonkeyPatch) -> None:
+    n = 2001
+    east = np.zeros(n)
+    east[-1] = 35.0
+    late_spike = recording(east, np.zeros(n), np.full(n, 11.0))
+    for rows in (2000, 400, 7):
+        monkeypatch.setattr("sbas.recording.BATCH_ROWS", rows)
+        assert survey(late_spike).static
+    short = recording(np.arange(59) * 40.0, np.zeros(59), np.full(59, 11.0))
+    assert not survey(short).static
+    slow = np.arange(60)
+    far_apart = recording(slow * 800.0, slow * 0.0, slow * 0 + 11.0, time_s=slow * 10)
+    assert not survey(far_apart).static
+    r = quiet(200)
+    assert not survey(r.replace(table=r.table.assign(speed_mps=20.0))).static
+
+
+def test_jittered_stamps_keep_their_interval_and_bounded_memory() -> None:
+    rng = np.random.default_rng(4)
+    n = 200_000
+    time = np.arange(n) + rng.normal(0, 1e-3, n)
+    r = recording(np.zeros(n), np.zeros(n), np.full(n, 11.0), time_s=time)
+    assert sampling_interval_ns(r) == pytest.approx(S, rel=1e-4)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 from rich import box
+from rich.markup import escape
 from rich.table import Table
 
 from sbas.cli import inputs, output
@@ -16,15 +17,17 @@ from sbas.integrity.evaluation import evaluate
 from sbas.integrity.failure_rates import FailureRate, failure_rate
 from sbas.integrity.rate_evidence import EVENT_KINDS
 from sbas.integrity.results import Evaluation, EvaluationSettings
+from sbas.numerals import percent, share, upward
 
 _DEFAULTS = EvaluationSettings()
 
 TimeToAlert = Annotated[
-    float, typer.Option("--time-to-alert", help="An HMI event lasts at least this [s].")
+    float, typer.Option("--time-to-alert", help="Shortest HMI event, in seconds.")
 ]
-Merge = Annotated[float, typer.Option("--merge", help="Events closer than this are one [s].")]
+Merge = Annotated[float, typer.Option("--merge", help="Closer events are one; in seconds.")]
 Reset = Annotated[
-    float, typer.Option("--reset", help="Merge time of the event list: the user's reset [s].")
+    float,
+    typer.Option("--reset", help="Merge time of the event list, in seconds."),
 ]
 Confidence = Annotated[float, typer.Option(help="Confidence of one-sided bounds.")]
 
@@ -37,7 +40,7 @@ def register(app: typer.Typer) -> None:
 def evaluate_files(
     files: inputs.Files,
     truth: inputs.TruthText = None,
-    alert_limit: Annotated[str, typer.Option(help="Horizontal alert limits [m].")] = "50,25,20",
+    alert_limit: Annotated[str, typer.Option(help="Alert limits in metres.")] = "50,25,20",
     report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
     frame: inputs.Frame = "",
     antenna_height: inputs.AntennaHeight = 0.0,
@@ -108,15 +111,15 @@ def print_verdict(result: Evaluation) -> None:
         print("errors are a lower bound: they are formed against the recording's own median")
     table = Table(box=box.SIMPLE, pad_edge=False)
     heads = ("AL [m]", "available", "incl. gaps", "HMI epochs", "HMI events",
-             f"HMI rate, upper {100 * result.settings.confidence:.12g} % [1/h]")  # fmt: skip
+             f"HMI rate, upper {percent(result.settings.confidence)} [1/h]")  # fmt: skip
     for head in heads:
-        table.add_column(head, justify="right")
+        table.add_column(escape(head), justify="right")
     for limit in result.alert_limits:
         up, rate = limit.availability, limit.rates.get("hmi")
         table.add_row(
             f"{limit.alert_limit_m:g}",
-            f"{up.availability_excluding_gaps.value:.6f}",
-            f"{up.availability.value:.6f}",
+            share(up.availability_excluding_gaps.value),
+            share(up.availability.value),
             "-" if limit.regions is None else f"{limit.regions['hmi']:,}",
             "-" if rate is None else str(rate.events),
             "-" if rate is None else _upper(rate.demonstrated),
@@ -128,19 +131,19 @@ def print_verdict(result: Evaluation) -> None:
 def _upper(figure: Estimate | Refusal) -> str:
     if isinstance(figure, Refusal):
         return "not demonstrated"
-    return "-" if figure.upper is None else f"{figure.upper:.4g}"
+    return "-" if figure.upper is None else upward(figure.upper)
 
 
 def rate(
     files: inputs.Files,
-    alert_limit: Annotated[float, typer.Option(help="Horizontal alert limit [m].")],
+    alert_limit: Annotated[float, typer.Option(help="Horizontal alert limit in metres.")],
     truth: inputs.TruthText = None,
     confidence: Confidence = _DEFAULTS.confidence,
     event: Annotated[
         str, typer.Option(help="; ".join(f"{k}: {v}" for k, v in EVENT_KINDS.items()))
     ] = "hmi",
     target_per_h: Annotated[
-        float | None, typer.Option("--target-per-h", help="Rate to be demonstrated [1/h].")
+        float | None, typer.Option("--target-per-h", help="Rate to be demonstrated per hour.")
     ] = None,
     frame: inputs.Frame = "",
     antenna_height: inputs.AntennaHeight = 0.0,

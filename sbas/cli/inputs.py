@@ -11,8 +11,8 @@ import typer
 from sbas.cli.output import progress
 from sbas.exceptions import InputError
 from sbas.input_check import repair
-from sbas.logs.archive import gathered, join_sources
-from sbas.logs.registry import scan
+from sbas.logs.archive import join_sources, joined_recording
+from sbas.logs.registry import read, scan
 from sbas.logs.truth_files import read_truth_table
 from sbas.recording import EpochSource
 from sbas.truth import FixedPoint, Trajectory, Truth
@@ -38,11 +38,11 @@ Frame = Annotated[
 ]
 AntennaHeight = Annotated[
     float,
-    typer.Option("--antenna-height", help="Height of the antenna above the truth's mark [m]."),
+    typer.Option("--antenna-height", help="Antenna above the truth's mark, in metres."),
 ]
 MaxStep = Annotated[
     float,
-    typer.Option("--truth-max-step", help="Longest step of a trajectory to interpolate [s]."),
+    typer.Option("--truth-max-step", help="Longest step to interpolate, in seconds."),
 ]
 Sort = Annotated[bool, typer.Option("--sort", help="Put epochs in the order of their times.")]
 Duplicates = Annotated[
@@ -66,7 +66,7 @@ ModeMap = Annotated[
 ]
 Geoid = Annotated[
     float | None,
-    typer.Option("--geoid", help="Geoid undulation for heights above the geoid [m]."),
+    typer.Option("--geoid", help="Geoid undulation for heights above the geoid in metres."),
 ]
 
 
@@ -91,15 +91,16 @@ def open_source(
         "geoid": geoid,
     }
     options = {name: value for name, value in given.items() if value is not None}
+    repairing = sort or duplicates or pl_zero
+    opened = read if repairing else scan
     sources = []
     for path in files:
         with progress(f"reading {path.name}", quiet) as callback:
-            sources.append(scan(path, format_name, progress=callback, **options))
-    source = join_sources(sources)
-    if not (sort or duplicates or pl_zero):
-        return source
+            sources.append(opened(path, format_name, progress=callback, **options))
+    if not repairing:
+        return join_sources(sources)
     return repair(
-        gathered(source),
+        joined_recording(sources),  # type: ignore[arg-type]
         sort=sort,
         duplicates=duplicates,  # type: ignore[arg-type]
         pl_zero=pl_zero,  # type: ignore[arg-type]
@@ -151,7 +152,7 @@ def _three_numbers(text: str) -> tuple[float, float, float] | None:
 
 
 def alert_limits(text: str) -> tuple[float, ...]:
-    """Alert limits from `50,25,20` [m]."""
+    """Alert limits from `50,25,20` in metres."""
     try:
         return tuple(float(word) for word in text.split(","))
     except ValueError:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 from rich import box
+from rich.markup import escape
 from rich.table import Table
 
 from sbas.cli import output
@@ -43,6 +44,8 @@ def kfactor(
     The trees of the EGNOS paper:  sbas kfactor --allocation npa_do229
     """
     if allocation is not None:
+        if risk is not None:
+            raise typer.BadParameter("give --risk or --allocation, not both")
         _allocation(allocation, json)
         return
     if risk is None:
@@ -70,10 +73,10 @@ def _allocation(name: str, json: bool) -> None:
     if json:
         output.print_json({"allocation": tree.to_dict(), "leaves": [f.to_dict() for f in leaves]})
         return
-    print(tree)
+    print(f"{tree.name}: {tree.title}")
     table = Table(box=box.SIMPLE, pad_edge=False)
     for head in ("node", "risk per sample", "K", "published K", "risk of published K"):
-        table.add_column(head, justify="left" if head == "node" else "right")
+        table.add_column(escape(head), justify="left" if head == "node" else "right")
     for leaf in leaves:
         published = "-" if leaf.published_k is None else f"{leaf.published_k:g}"
         achieved = (
@@ -88,11 +91,11 @@ def _allocation(name: str, json: bool) -> None:
 
 
 def plan(
-    rate: Annotated[float, typer.Option(help="Rate to be demonstrated [1/h].")],
+    rate: Annotated[float, typer.Option(help="Rate to be demonstrated per hour.")],
     confidence: Annotated[float, typer.Option(help="One-sided confidence.")] = 0.95,
     events: Annotated[int, typer.Option(help="Events that may occur meanwhile.")] = 0,
     assumed_rate: Annotated[
-        float | None, typer.Option(help="True rate assumed for the chance to pass [1/h].")
+        float | None, typer.Option(help="True rate assumed for the chance to pass per hour.")
     ] = None,
     json: output.Json = False,
 ) -> None:

@@ -95,13 +95,13 @@ def _print_check(result: CheckResult) -> None:
 
 def simulate(
     out: Annotated[Path, typer.Option(help="File to write: .sbf or .parquet.")],
-    hours: Annotated[float | None, typer.Option(help="Length of the recording [h].")] = None,
+    hours: Annotated[float | None, typer.Option(help="Length of the recording in hours.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of all randomness.")] = None,
     settings: Annotated[
         Path | None, typer.Option(help="TOML settings; without, those of the demo.")
     ] = None,
     failure_rate_per_h: Annotated[
-        float | None, typer.Option(help="Rate of injected dangerous failures [1/h].")
+        float | None, typer.Option(help="Rate of injected dangerous failures per hour.")
     ] = None,
     json: output.Json = False,
     quiet: output.Quiet = False,

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbas.estimate import Counted, Estimate
-from sbas.input_check import Gaps
 from sbas.integrity.counting import poisson_bounds
 from sbas.integrity.events import Runs
+from sbas.recording_survey import Gaps
 from sbas.timescales import NS_PER_S
 
 Ints = NDArray[np.int64]
@@ -67,7 +67,14 @@ def continuity_risk(first: Ints, stop: Ints, rows: int, window: int) -> float:
 
 
 def availability(
-    down: Runs, gaps: Gaps, *, interval_ns: int, confidence: float, window_epochs: int = 15
+    down: Runs,
+    gaps: Gaps,
+    *,
+    up_ns: int,
+    down_ns: int,
+    interval_ns: int,
+    confidence: float,
+    window_epochs: int = 15,
 ) -> Availability:
     """Availability figures from the runs of down epochs and the gaps of a record.
 
@@ -75,6 +82,7 @@ def availability(
     ----------
     down : runs of epochs without service (no fix, level missing, or level >= alert limit).
     gaps : gaps of the record.
+    up_ns, down_ns : time that up and down epochs cover [ns].
     interval_ns : sampling interval [ns].
     confidence : one-sided, for the bounds of mttf and mttr.
     window_epochs : W of the continuity risk.
@@ -87,9 +95,9 @@ def availability(
     """
     hour_ns = 3600 * NS_PER_S
     down_rows = int(np.sum(down.last - down.first + 1))
-    up_h = (down.rows - down_rows) * interval_ns / hour_ns
+    up_h = up_ns / hour_ns
     gap_h = float(gaps.missing_ns(interval_ns).sum()) / hour_ns
-    down_h = down_rows * interval_ns / hour_ns
+    down_h = down_ns / hour_ns
     first, stop = _fused(
         np.concatenate([down.first, gaps.row]), np.concatenate([down.last + 1, gaps.row])
     )

@@ -18,7 +18,7 @@ from sbas.integrity.results import (
     ErrorEllipse,
     Evaluation,
     EvaluationSettings,
-    Exposure,
+    ExposureHours,
     Summary,
 )
 from sbas.integrity.stanford import REGIONS
@@ -87,8 +87,9 @@ def evaluate(
             Finding(
                 "E09",
                 "warning",
-                "the truth's reference frame is not stated; 1 m is allowed for it",
-                evidence="ITRF and ETRS89 part by about 2.5 cm a year since 1989",
+                "the truth's reference frame is not stated: errors may be wrong by some 1 m",
+                evidence="ITRF and ETRS89 part by about 2.5 cm a year since 1989; the 1 m is in "
+                "truth_sigma_h_m, no error and no count is changed by it",
                 cure="--frame, such as --frame 'ITRF2014 2010.0'",
             )
         )
@@ -135,14 +136,14 @@ def _evaluation(
 ) -> Evaluation:
     survey = checked.survey
     interval_ns = survey.interval_ns
-    hour = 3600 * NS_PER_S / interval_ns
-    exposure = Exposure(
-        recorded_hours=tally.epochs / hour,
-        gap_hours=float(survey.gaps.missing_ns(interval_ns).sum()) / (3600 * NS_PER_S),
-        without_error_hours=(tally.epochs - tally.hpe.count) / hour,
-        without_level_hours=(tally.epochs - tally.hpl.count) / hour,
-        judged_hours=tally.judged / hour,
-        error_hours=tally.hpe.count / hour,
+    hour_ns = 3600 * NS_PER_S
+    exposure = ExposureHours(
+        recorded_hours=tally.covered_ns / hour_ns,
+        gap_hours=float(survey.gaps.missing_ns(interval_ns).sum()) / hour_ns,
+        without_error_hours=(tally.covered_ns - tally.error_ns) / hour_ns,
+        without_level_hours=(tally.covered_ns - tally.level_ns) / hour_ns,
+        judged_hours=tally.judged_ns / hour_ns,
+        error_hours=tally.error_ns / hour_ns,
     )
     if tally.levels_left_out:
         findings.append(
@@ -164,6 +165,25 @@ def _evaluation(
                 cure="check the truth, and the units in the file's header",
             )
         )
+    if truth is not None and not hpe:
+        findings.append(
+            Finding(
+                "E01",
+                "warning",
+                "the truth covers no epoch that has a position: no error was formed",
+                cure="check the times and the steps of the trajectory",
+            )
+        )
+    if tally.truth_sigma_h_m > 0.1 * min(settings.alert_limits_m):
+        findings.append(
+            Finding(
+                "E09",
+                "warning",
+                f"the truth is uncertain by up to {tally.truth_sigma_h_m:.3g} m (1-sigma), more "
+                f"than a tenth of the alert limit {min(settings.alert_limits_m):g} m",
+                cure="give a better truth",
+            )
+        )
     lower_bound = truth is not None and truth.lower_bound
 
     def counted(kind: EventKind, limit: float, merge_s: float) -> Events:
@@ -172,12 +192,14 @@ def _evaluation(
         return find_events(runs, interval_ns=interval_ns, merge_s=merge_s, minimum_s=minimum)
 
     def rate(kind: EventKind, limit: float) -> RateEvidence:
-        hours = exposure.error_hours if kind == "exceeds_al" else exposure.judged_hours
+        events = counted(kind, limit, settings.merge_s)
         return rate_evidence(
             kind,
             limit,
-            events=len(counted(kind, limit, settings.merge_s)),
-            hours=hours,
+            events=len(events),
+            runs=len(tally.mi.whole() if kind == "mi" else tally.at_limit(kind, limit)),
+            event_hours=float(events.duration_s.sum()) / 3600,
+            judged_hours=(exposure.error_hours if kind == "exceeds_al" else exposure.judged_hours),
             confidence=settings.confidence,
             lower_bound=lower_bound,
         )
@@ -187,6 +209,8 @@ def _evaluation(
         up = availability(
             tally.down[al].whole(),
             survey.gaps,
+            up_ns=tally.covered_ns - tally.down_ns[al],
+            down_ns=tally.down_ns[al],
             interval_ns=interval_ns,
             confidence=settings.confidence,
         )

@@ -148,8 +148,9 @@ def find_events(
     runs : runs of bad epochs of the whole record.
     interval_ns : sampling interval dt [ns]; an event is [first epoch, last epoch + dt).
     merge_s : runs with start - previous end <= merge_s are one event [s].
-    minimum_s : shorter events are dropped [s], such as the time to alert; a censored one is
-        kept whatever its length, since it may have lasted longer than was seen.
+    minimum_s : shorter events are dropped [s], such as the time to alert; within half an
+        interval of it counts as reached, since stamps jitter; a censored one is kept whatever
+        its length, since it may have lasted longer than was seen.
     """
     start, end = runs.start_ns, runs.last_ns + interval_ns
     cut = runs.cut_start | runs.cut_end
@@ -159,5 +160,5 @@ def find_events(
         tails = np.concatenate([heads[1:] - 1, [start.size - 1]])
         start, end = start[heads], end[tails]
         cut = np.logical_or.reduceat(cut, heads)
-    long_enough = (end - start >= round(minimum_s * NS_PER_S)) | cut
+    long_enough = (end - start + interval_ns // 2 >= round(minimum_s * NS_PER_S)) | cut
     return Events(start[long_enough], end[long_enough], cut[long_enough])

@@ -11,6 +11,7 @@ from scipy import special
 
 from sbas.exceptions import InputError
 from sbas.integrity.counting import checked_alpha, garwood_limits, is_number
+from sbas.numerals import percent, upward
 
 HOURS_PER_YEAR = 8766.0
 
@@ -62,8 +63,8 @@ class Plan:
             assumed = self.rate_per_h / 10
             chance = pass_probability(self.events, assumed, self.hours)
         return (
-            f"{self.hours:.4g} h ({self.years:.4g} years) {seen} show a rate below "
-            f"{self.rate_per_h:g}/h at {100 * self.confidence:.12g} % confidence.\n"
+            f"{upward(self.hours)} h ({upward(self.years)} years) {seen} show a rate below "
+            f"{self.rate_per_h:g}/h at {percent(self.confidence)} confidence.\n"
             f"If the true rate is {assumed:g}/h, the trial passes with probability {chance:.3g}."
         )
 
@@ -104,7 +105,7 @@ def plan_hours(
     Examples
     --------
     >>> print(plan_hours(1e-7))
-    2.996e+07 h (3417 years) without an event show a rate below 1e-07/h at 95 % confidence.
+    2.996×10⁷ h (3,418 years) without an event show a rate below 1e-07/h at 95 % confidence.
     If the true rate is 1e-08/h, the trial passes with probability 0.741.
     """
     checked_alpha(confidence)

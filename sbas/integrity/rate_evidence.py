@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from sbas.estimate import Estimate, Quoted, Refusal
@@ -34,17 +34,24 @@ _LOWER_BOUND = Refusal(
     "--truth LAT,LON,HEIGHT of the antenna",
 )
 _NO_EXPOSURE = Refusal(
-    "not demonstrated: no epoch has both what the event needs", "see the exposure's table"
+    "not demonstrated: no time remains in which an event could have begun",
+    "see the table of exposure: hours without error, without level, or within events",
 )
 
 
 @dataclass(frozen=True)
 class RateEvidence:
-    """The rate of one kind of event at one alert limit, in every evidence class."""
+    """The rate of one kind of event at one alert limit, in every evidence class.
+
+    `events` are `runs` of bad epochs merged over the merge time; `event_hours` the time within
+    them, which is no exposure: `hours` is what remains, in which an event could begin.
+    """
 
     event: EventKind
     alert_limit_m: float
     events: int
+    runs: int
+    event_hours: float
     hours: float
     demonstrated: Estimate | Refusal
     modelled: Estimate | Refusal
@@ -55,6 +62,8 @@ class RateEvidence:
             "event": self.event,
             "alert_limit_m": self.alert_limit_m,
             "events": self.events,
+            "runs": self.runs,
+            "event_hours": self.event_hours,
             "hours": self.hours,
             "demonstrated": self.demonstrated.to_dict(),
             "modelled": self.modelled.to_dict(),
@@ -67,7 +76,9 @@ def rate_evidence(
     alert_limit_m: float,
     *,
     events: int,
-    hours: float,
+    runs: int,
+    event_hours: float,
+    judged_hours: float,
     confidence: float,
     lower_bound: bool,
 ) -> RateEvidence:
@@ -78,16 +89,32 @@ def rate_evidence(
     event : kind of event.
     alert_limit_m : alert limit [m].
     events : declustered events.
-    hours : exposure: epochs at which such an event could be seen, times the interval [h].
+    runs : runs of bad epochs before they were merged.
+    event_hours : time within the events [h].
+    judged_hours : time covered by epochs at which such an event could be seen [h].
     confidence : of the one-sided upper bound.
     lower_bound : True where errors were formed against the recording's own median.
     """
     demonstrated: Estimate | Refusal
+    hours = max(judged_hours - event_hours, 0.0)
     if lower_bound:
         demonstrated = _LOWER_BOUND
     elif hours <= 0:
         demonstrated = _NO_EXPOSURE
     else:
         demonstrated = poisson_bounds(events, hours, confidence)
+        if runs > 2 * events:
+            caveat = f"{runs} runs of bad epochs were merged into {events} events"
+            demonstrated = replace(demonstrated, caveats=(*demonstrated.caveats, caveat))
     claimed = _NO_CLAIM if event == "exceeds_al" else NPA_CLAIM
-    return RateEvidence(event, alert_limit_m, events, hours, demonstrated, NOT_MODELLED, claimed)
+    return RateEvidence(
+        event=event,
+        alert_limit_m=alert_limit_m,
+        events=events,
+        runs=runs,
+        event_hours=event_hours,
+        hours=hours,
+        demonstrated=demonstrated,
+        modelled=NOT_MODELLED,
+        claimed=claimed,
+    )

@@ -14,8 +14,10 @@ from sbas.exceptions import InputError
 from sbas.findings import Finding
 from sbas.input_check import CheckResult
 from sbas.integrity.availability import Availability
+from sbas.integrity.counting import checked_alpha
 from sbas.integrity.events import Events
 from sbas.integrity.rate_evidence import EventKind, RateEvidence
+from sbas.numerals import key
 from sbas.recording import RecordingMeta
 from sbas.streaming import DensityGrid, Distribution, ThinnedSeries
 from sbas.timescales import NS_PER_S
@@ -31,8 +33,9 @@ class EvaluationSettings:
     alert_limits_m : horizontal alert limits [m].
     time_to_alert_s : an HMI event lasts at least this [s]; 10 s is NPA's, 6 s PA's
         (Navipedia, EGNOS Performances).
-    merge_s : events closer than this are one for a rate [s]; without a measured decorrelation
-        time the floor of the convention max(tau/2, 60 s), which counts rather too many.
+    merge_s : runs closer than this are one event of a rate [s]: the floor of the convention
+        max(tau/2, 60 s), since no decorrelation time is measured here. Runs are merged before
+        the time to alert is asked of them, so that flicker counts as one lasting event.
     reset_s : merge time of the event list: what the user system needs to be reset [s].
     confidence : of every one-sided bound.
     accept : finding codes that the user accepts.
@@ -58,12 +61,7 @@ class EvaluationSettings:
         for name in ("time_to_alert_s", "merge_s", "reset_s"):
             if not 0 <= getattr(self, name) < math.inf:
                 raise InputError(f"{name} must be 0 s or more", evidence=f"{getattr(self, name)}")
-        if not 0 < self.confidence < 1:
-            raise InputError(
-                "the confidence must lie between 0 and 1",
-                evidence=f"got {self.confidence}",
-                cure="--confidence 0.95",
-            )
+        checked_alpha(self.confidence)
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ class ErrorEllipse:
 
 
 @dataclass(frozen=True)
-class Exposure:
+class ExposureHours:
     """The hours that figures rest on, and why the others do not count [h]."""
 
     recorded_hours: float
@@ -162,7 +160,7 @@ class Evaluation:
     truth: Truth | None
     epochs: int
     hours: float
-    exposure: Exposure
+    exposure: ExposureHours
     hpe_m: Summary | None
     vpe_m: Summary | None
     hpl_m: Summary | None
@@ -204,7 +202,7 @@ class Evaluation:
             "modes": self.modes,
             "exposure": dict(vars(self.exposure)),
             "settings": dict(vars(self.settings)),
-            "alert_limits": {f"{r.alert_limit_m:g}": _limit_dict(r) for r in self.alert_limits},
+            "alert_limits": {key(r.alert_limit_m): _limit_dict(r) for r in self.alert_limits},
             "findings": [f.to_dict() for f in self.findings],
             "sources": [dict(vars(s)) for s in self.meta.sources],
         }
@@ -224,7 +222,9 @@ class Evaluation:
             for limit in self.alert_limits
             for kind, rate in limit.rates.items()
         ]
-        return pd.DataFrame(rows).set_index(["alert_limit_m", "event"])
+        heads = ("alert_limit_m", "event", "events", "hours", "upper_per_h", "demonstrated",
+                 "availability")  # fmt: skip
+        return pd.DataFrame(rows, columns=heads).set_index(["alert_limit_m", "event"])
 
     def __str__(self) -> str:
         lines = [f"{self.epochs:,} epochs, {self.hours:.6g} h recorded"]

@@ -14,6 +14,7 @@ from sbas.estimate import Counted, Estimate, Evidence
 from sbas.exceptions import InputError
 from sbas.integrity.counting import is_number
 from sbas.integrity.planning import plan_hours
+from sbas.numerals import percent, upward
 
 SIL_BANDS_PER_H = ((4, 1e-9, 1e-8), (3, 1e-8, 1e-7), (2, 1e-7, 1e-6), (1, 1e-6, 1e-5))
 """Level, lower limit (inside) and upper limit (outside) [1/h]: IEC 61508-1, 7.6.2, high demand."""
@@ -194,6 +195,23 @@ def _upper_per_h(estimate: Estimate) -> float | None:
         raise InputError(
             "a verdict needs a rate per hour", where="estimate", evidence=f"unit {estimate.unit!r}"
         )
+    if estimate.confidence is not None and estimate.confidence < 0.5:
+        raise InputError(
+            "a verdict needs a confidence of 50 % or more",
+            where="estimate",
+            evidence=percent(estimate.confidence),
+            cure="estimate the rate with confidence=0.95",
+        )
+    basis = estimate.basis
+    if isinstance(basis, Counted) and not math.isclose(
+        estimate.value * basis.hours, basis.events, rel_tol=1e-9, abs_tol=1e-300
+    ):
+        raise InputError(
+            "the rate is not its own count over its hours",
+            where="estimate",
+            evidence=f"{estimate.value!r} per hour beside {basis}",
+            cure="make it with poisson_bounds",
+        )
     bounded = estimate.upper is not None and estimate.sided != "lower"
     if not bounded and estimate.evidence != "claimed":
         raise InputError(
@@ -212,7 +230,8 @@ def _shortfall(estimate: Estimate, target: float) -> list[str]:
         return []
     plan = plan_hours(target, confidence=estimate.confidence, events=math.ceil(basis.events))
     return [
-        f"with {plan.events} {basis.of} this takes {plan.hours:.4g} h ({plan.years:.4g} years); "
+        f"with {plan.events} {basis.of} this takes {upward(plan.hours)} h "
+        f"({upward(plan.years)} years); "
         f"recorded are {basis.hours:.6g} h"
     ]
 
@@ -221,7 +240,7 @@ def _bound_text(estimate: Estimate) -> str:
     if estimate.upper is None:
         return "no bound is given"
     two = " of a two-sided interval" if estimate.sided == "two" else ""
-    return f"upper bound{two} {estimate.upper:.6g}/h at {_percent(estimate.confidence)}"
+    return f"upper bound{two} {upward(estimate.upper, 6)}/h at {_percent(estimate.confidence)}"
 
 
 def _basis_text(estimate: Estimate) -> str:
@@ -231,4 +250,4 @@ def _basis_text(estimate: Estimate) -> str:
 
 
 def _percent(confidence: float | None) -> str:
-    return "unknown confidence" if confidence is None else f"{100 * confidence:.12g} %"
+    return "unknown confidence" if confidence is None else percent(confidence)

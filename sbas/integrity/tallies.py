@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sbas.input_check import GAP_STEPS, Survey
 from sbas.integrity.events import Runs, Stretch, find_runs, join_runs
 from sbas.integrity.position_error import position_errors
 from sbas.integrity.rate_evidence import EventKind
 from sbas.integrity.stanford import REGIONS, stanford_regions
 from sbas.recording import MODES, Flag, major_semi_axis_m
+from sbas.recording_survey import GAP_STEPS, Survey
 from sbas.streaming import DensityGrid, Distribution, ThinnedSeries
 from sbas.truth import Truth
 
@@ -78,8 +78,12 @@ class RecordTally:
     ) -> None:
         self.truth = truth
         self.alert_limits_m = alert_limits_m
+        self.interval_ns = survey.interval_ns
         self.max_step_ns = int(GAP_STEPS * survey.interval_ns)
         self.epochs = self.judged = self.mi_epochs = self.levels_left_out = 0
+        self.covered_ns = self.judged_ns = self.error_ns = self.level_ns = 0
+        self.down_ns = dict.fromkeys(alert_limits_m, 0)
+        self._last_ns: int | None = None
         self.hpe, self.vpe, self.hpl, self.vpl = (Distribution() for _ in range(4))
         self.truth_sigma_h_m = 0.0
         self.modes = dict.fromkeys((*MODES, "unknown"), 0)
@@ -103,6 +107,8 @@ class RecordTally:
             return
         self.epochs += n
         stretch = Stretch(batch.index.to_numpy().astype(np.int64), self.max_step_ns)
+        covers = self._covered(stretch.time_ns)
+        self.covered_ns += int(covers.sum())
         left_out = (batch["flags"].to_numpy() & _LEFT_OUT) != 0
         hpl = np.where(left_out, np.nan, batch["hpl_m"].to_numpy())
         vpl = np.where(left_out, np.nan, batch["vpl_m"].to_numpy())
@@ -120,8 +126,13 @@ class RecordTally:
         )
         for al in self.alert_limits_m:
             # Written so that a missing level or fix is down.
-            self.down[al].add(np.flatnonzero(~(fix & (hpl < al))), stretch)
-        hpe = np.full(n, np.nan) if self.truth is None else self._update_errors(batch, hpl, stretch)
+            down = ~(fix & (hpl < al))
+            self.down[al].add(np.flatnonzero(down), stretch)
+            self.down_ns[al] += int(covers[down].sum())
+        self.level_ns += int(covers[np.isfinite(hpl)].sum())
+        hpe = np.full(n, np.nan)
+        if self.truth is not None:
+            hpe = self._update_errors(batch, hpl, stretch, covers)
         n_sv = batch["n_sv"].to_numpy().astype(float)
         sigmas = (batch[name].to_numpy() for name in ("sigma_e_m", "sigma_n_m", "cov_en_m2"))
         self.strips.update(
@@ -135,7 +146,16 @@ class RecordTally:
             },
         )
 
-    def _update_errors(self, batch: pd.DataFrame, hpl: Floats, stretch: Stretch) -> Floats:
+    def _covered(self, time_ns: Ints) -> Ints:
+        """(n,) time that each epoch stands for: the step before it, at most the interval, so
+        that no rate of recording makes more hours than have passed."""
+        first = time_ns[0] - self.interval_ns if self._last_ns is None else self._last_ns
+        self._last_ns = int(time_ns[-1])
+        return np.minimum(np.diff(time_ns, prepend=first), self.interval_ns)
+
+    def _update_errors(
+        self, batch: pd.DataFrame, hpl: Floats, stretch: Stretch, covers: Ints
+    ) -> Floats:
         assert self.truth is not None
         errors = position_errors(batch, self.truth)
         east, north = errors["east_m"].to_numpy(), errors["north_m"].to_numpy()
@@ -151,6 +171,8 @@ class RecordTally:
         self.scatter.update(east, north)
         judged = formed & np.isfinite(hpl)
         self.judged += int(judged.sum())
+        self.judged_ns += int(covers[judged].sum())
+        self.error_ns += int(covers[formed].sum())
         misled = np.flatnonzero(hpe >= hpl)
         self.mi_epochs += misled.size
         self.mi.add(misled, stretch, judged)
@@ -178,7 +200,8 @@ class RecordTally:
 
     def merge(self, other: RecordTally) -> None:
         """Add the tally of the part of the record that follows."""
-        for name in ("epochs", "judged", "mi_epochs", "levels_left_out"):
+        for name in ("epochs", "judged", "mi_epochs", "levels_left_out", "covered_ns",
+                     "judged_ns", "error_ns", "level_ns"):  # fmt: skip
             setattr(self, name, getattr(self, name) + getattr(other, name))
         for name in ("hpe", "vpe", "hpl", "vpl", "mi", "strips", "scatter"):
             getattr(self, name).merge(getattr(other, name))
@@ -186,6 +209,7 @@ class RecordTally:
         for mode, count in other.modes.items():
             self.modes[mode] += count
         for al in self.alert_limits_m:
+            self.down_ns[al] += other.down_ns[al]
             self.regions[al] += other.regions[al]
             self.down[al].merge(other.down[al])
         for key, runs in self._over.items():

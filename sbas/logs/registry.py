@@ -344,7 +344,7 @@ def _completed(
 ) -> RecordingMeta:
     """Metadata with the file as last source, findings of detection, options and versions."""
     source = Source(
-        path=os.fspath(path),
+        path=_printable(os.fspath(path)),
         bytes=os.path.getsize(path),
         sha256=digest(),
         format=found.format.name,
@@ -368,6 +368,11 @@ def _completed(
             "pyarrow": pa.__version__,
         },
     )
+
+
+def _printable(path: str) -> str:
+    """A path whose bytes are no text, or that holds control characters, with those escaped."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in path)
 
 
 @functools.cache

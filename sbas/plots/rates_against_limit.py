@@ -9,6 +9,7 @@ from sbas.integrity.rate_evidence import NPA_CLAIM, EventKind, RateEvidence
 from sbas.integrity.results import Evaluation
 from sbas.integrity.sil import SIL_BANDS_PER_H
 from sbas.integrity.tallies import CURVE_LIMITS_M
+from sbas.numerals import percent
 from sbas.plots.style import (
     BLUE,
     FULL_WIDTH,
@@ -93,7 +94,7 @@ def _points(
         return
     ax.plot(
         *zip(*bounded, strict=True), "v-", color=colour, linewidth=0.9, markersize=size,
-        label=f"demonstrated: {name}, upper bound at {100 * confidence:g} %",
+        label=f"demonstrated: {name}, upper bound at {percent(confidence)}",
     )  # fmt: skip
     seen = [(al, e.value) for al, e in shown if isinstance(e, Estimate) and e.value > 0]
     if seen:

@@ -9,8 +9,8 @@ from typing import Any
 
 from sbas.exceptions import InputError
 from sbas.integrity.results import Evaluation
+from sbas.numerals import count, hours, stamp
 from sbas.reporting.content import Section
-from sbas.reporting.numbers import count, hours, stamp
 from sbas.reporting.sections import (
     event_list,
     exposure_hours,
@@ -103,7 +103,7 @@ def report(evaluation: Evaluation, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     page = render_html(report_of(evaluation))
     try:
-        target.write_text(page, encoding="utf-8", newline="\n")
+        target.write_text(page, encoding="utf-8", errors="backslashreplace", newline="\n")
     except OSError as error:
         raise InputError(
             "the report cannot be written",

@@ -5,11 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sbas.input_check import Gaps
-from sbas.integrity.availability import availability, continuity_risk
-from sbas.integrity.events import Stretch, find_runs
+from sbas.integrity.availability import Availability, availability, continuity_risk
+from sbas.integrity.events import Runs, Stretch, find_runs
+from sbas.recording_survey import Gaps
 
 S = 1_000_000_000
+
+
+def of_seconds(down: Runs, gaps: Gaps) -> Availability:
+    """Availability of a 1 Hz record."""
+    rows = int(np.sum(down.last - down.first + 1))
+    return availability(
+        down, gaps, up_ns=(down.rows - rows) * S, down_ns=rows * S, interval_ns=S, confidence=0.95
+    )
 
 
 def down_rows(up: str) -> tuple[np.ndarray, np.ndarray, int]:
@@ -45,7 +53,7 @@ def test_gaps_count_as_down_or_not_at_all() -> None:
     time = np.concatenate([np.arange(10), np.arange(15, 25)]) * S
     runs = find_runs(np.array([14, 15]), Stretch(time, int(1.5 * S)))
     gaps = Gaps(np.array([10]), np.array([9 * S]), np.array([15 * S]))
-    result = availability(runs, gaps, interval_ns=S, confidence=0.95)
+    result = of_seconds(runs, gaps)
     assert result.availability.value == pytest.approx(18 / 25)
     assert result.availability_excluding_gaps.value == pytest.approx(18 / 20)
     assert (result.losses, result.recoveries) == (2, 2)
@@ -58,9 +66,7 @@ def test_gaps_count_as_down_or_not_at_all() -> None:
 def test_without_a_loss_the_mttf_is_its_lower_bound() -> None:
     stretch = Stretch(np.arange(7200) * S, int(1.5 * S))
     none = np.empty(0, np.int64)
-    up = availability(
-        find_runs(none, stretch), Gaps(none, none, none), interval_ns=S, confidence=0.95
-    )
+    up = of_seconds(find_runs(none, stretch), Gaps(none, none, none))
     # ln 20 = 2.9957 expected losses would have shown one with 95 %.
     assert up.mttf.value == pytest.approx(2.0 / np.log(20), rel=1e-12)
     assert up.mttf.lower == up.mttf.value
@@ -71,5 +77,5 @@ def test_a_gap_within_down_time_is_one_loss() -> None:
     time = np.array([0, 1, 2, 10, 11, 12]) * S
     runs = find_runs(np.array([2, 3]), Stretch(time, int(1.5 * S)))
     gaps = Gaps(np.array([3]), np.array([2 * S]), np.array([10 * S]))
-    result = availability(runs, gaps, interval_ns=S, confidence=0.95)
+    result = of_seconds(runs, gaps)
     assert (result.losses, result.recoveries) == (1, 1)

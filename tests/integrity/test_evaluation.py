@@ -56,7 +56,9 @@ def test_events_and_rates_by_hand() -> None:
     assert len(at[50.0].events["mi"]) == 4
     rate = at[20.0].rates["hmi"]
     assert rate.events == 2
-    assert rate.hours == pytest.approx((4000 - 10) / 3600)
+    # Ten epochs have no level, and 42 s lie within the two events: no event can begin there.
+    assert rate.event_hours == pytest.approx(42 / 3600)
+    assert rate.hours == pytest.approx((4000 - 10 - 42) / 3600)
     assert isinstance(rate.demonstrated, Estimate)
     # Two events, one-sided 95 %: chi-square 0.95 quantile with 6 degrees of freedom is 12.59159.
     assert rate.demonstrated.upper == pytest.approx(12.591587243743977 / 2 / rate.hours, rel=1e-9)
@@ -206,3 +208,43 @@ def test_the_error_ellipse_is_the_sample_covariance() -> None:
     major, minor, azimuth = ellipse.axes()
     assert (major**2, minor**2) == pytest.approx(np.linalg.eigvalsh(cov)[::-1].tolist(), rel=1e-5)
     assert azimuth == pytest.approx(np.degrees(np.arctan2(2.0, 1.0)), abs=2)
+
+
+def test_no_rate_of_recording_makes_more_hours_than_have_passed() -> None:
+    time = np.concatenate([np.arange(6000), 6000 + np.arange(5000) / 10])
+    zero = np.zeros(time.size)
+    result = evaluate(recording(zero, zero, zero + 11.0, time_s=time), truth=POINT)
+    passed = (time[-1] + 1) / 3600
+    assert result.hours == pytest.approx(passed, rel=1e-12)
+    assert result.at(50.0).rates["hmi"].hours == pytest.approx(passed, rel=1e-12)
+    assert "E27" in [f.code for f in result.findings]
+
+
+def test_a_record_that_misleads_throughout_demonstrates_nothing() -> None:
+    n = 3600
+    result = evaluate(recording(np.full(n, 60.0), np.zeros(n), np.full(n, 10.0)), truth=POINT)
+    assert isinstance(result.at(50.0).rates["hmi"].demonstrated, Refusal)
+
+
+def test_flicker_that_is_merged_is_said() -> None:
+    east = np.zeros(6000)
+    east[np.arange(6000) % 100 < 50] = 60.0
+    rate = evaluate(recording(east, np.zeros(6000), np.full(6000, 10.0)), truth=POINT).at(50.0)
+    assert rate.rates["hmi"].events == 1
+    assert rate.rates["hmi"].runs == 60
+    assert len(rate.events["hmi"]) == 60
+
+
+def test_the_time_to_alert_is_reached_in_spite_of_jitter() -> None:
+    time = np.arange(100) + 0.0
+    east = np.zeros(100)
+    east[40:50] = 60.0
+    time[49] -= 0.05
+    result = evaluate(recording(east, np.zeros(100), np.full(100, 10.0), time_s=time), truth=POINT)
+    assert result.at(50.0).rates["hmi"].events == 1
+
+
+def test_close_alert_limits_keep_their_results() -> None:
+    limits = [25.0000001, 25.0, 24.9999]
+    plain = evaluate(quiet(100), truth=POINT, alert_limits_m=limits).to_dict()["alert_limits"]
+    assert [entry["alert_limit_m"] for entry in plain.values()] == limits

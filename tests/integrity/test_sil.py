@@ -97,7 +97,7 @@ def test_targets_are_missed_by_a_bound_on_them() -> None:
 def test_a_missed_target_says_what_it_takes() -> None:
     verdict = meets(poisson_bounds(0, 83.3, 0.95, of="HMI events"), 1e-7)
     assert verdict.notes[-1] == (
-        "with 0 HMI events this takes 2.996e+07 h (3417 years); recorded are 83.3 h"
+        "with 0 HMI events this takes 2.996×10⁷ h (3,418 years); recorded are 83.3 h"
     )
     assert "upper bound 0.0359632/h at 95 % is not below the target of 1e-07/h" in verdict.text
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from sbas.integrity.events import Events
 from sbas.integrity.results import Evaluation
+from sbas.numerals import count, number, stamp
 from sbas.reporting.content import Section, Table, table
-from sbas.reporting.numbers import count, number, stamp
 
 SHOWN = 50
 """Events that a table lists; the others are counted."""
@@ -28,7 +28,7 @@ def section(evaluation: Evaluation) -> Section:
         words = "No event of any kind was seen."
     else:
         words = (
-            f"Runs of epochs less than {evaluation.settings.reset_s:g} s apart are one event "
+            f"Runs of epochs at most {evaluation.settings.reset_s:g} s apart are one event here "
             "(reset time of the user system); rates merge more widely, see Parameters."
         )
     return Section("events", "Events", paragraphs=(words,), tables=tuple(tables))

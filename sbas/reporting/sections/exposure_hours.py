@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sbas.integrity.results import Evaluation
+from sbas.numerals import count, number
 from sbas.reporting.content import Section, table
-from sbas.reporting.numbers import count, number
 
 
 def section(evaluation: Evaluation) -> Section:

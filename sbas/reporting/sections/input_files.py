@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sbas.integrity.results import Evaluation
+from sbas.numerals import count, metres, number
 from sbas.reporting.content import Cell, Section, table
-from sbas.reporting.numbers import count, metres, number
 from sbas.timescales import NS_PER_S
 
 UNSTATED = "not stated"

@@ -6,6 +6,7 @@ import platform
 from importlib.metadata import version
 
 from sbas.integrity.results import Evaluation
+from sbas.numerals import percent
 from sbas.reporting.content import Cell, Section, table
 
 SOFTWARE = ("sbas", "numpy", "scipy", "pandas", "matplotlib")
@@ -19,7 +20,7 @@ def section(evaluation: Evaluation) -> Section:
         ("time to alert", f"{s.time_to_alert_s:g} s", "an HMI event lasts at least this"),
         ("merge time, rates", f"{s.merge_s:g} s", "closer events are one in a rate"),
         ("merge time, event list", f"{s.reset_s:g} s", "reset time of the user system"),
-        ("confidence", f"{100 * s.confidence:g} %", "of every one-sided bound"),
+        ("confidence", f"{percent(s.confidence)}", "of every one-sided bound"),
         ("findings accepted", ", ".join(s.accept) or "none", "errors taken as warnings"),
     ]
     rows += [(f"option {name}", value, "of the reader or generator") for name, value in

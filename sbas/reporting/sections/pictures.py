@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from sbas.integrity.results import Evaluation
+from sbas.numerals import count
 from sbas.plots import (
     availability_against_limit,
     error_scatter,
@@ -17,7 +18,6 @@ from sbas.plots import (
 from sbas.plots.style import Sheet, house_style
 from sbas.reporting.content import Picture, Section
 from sbas.reporting.inline_svg import inline_svg
-from sbas.reporting.numbers import count
 
 
 def section(evaluation: Evaluation) -> Section:

@@ -9,8 +9,8 @@ from sbas.integrity.availability import Availability
 from sbas.integrity.rate_evidence import EVENT_KINDS
 from sbas.integrity.results import Evaluation
 from sbas.integrity.stanford import REGIONS
+from sbas.numerals import count, hours, metres, number, percent, share, upward
 from sbas.reporting.content import Cell, Section, Table, table
-from sbas.reporting.numbers import count, hours, metres, number, share, upward
 
 _REGION_HEADS = {
     "nominal": "nominal", "unavailable": "unavailable", "mi_unavailable": "MI, unavailable",
@@ -99,7 +99,7 @@ def _rates(evaluation: Evaluation) -> Table:
     return table(
         "Rates of events per hour, by evidence class",
         "#Alert limit [m]|Event|#Events|#Hours [h]|#Demonstrated: counted [1/h]|"
-        f"#Demonstrated: upper bound at {100 * settings.confidence:g} % [1/h]|#Modelled [1/h]|"
+        f"#Demonstrated: upper bound at {percent(settings.confidence)} [1/h]|#Modelled [1/h]|"
         "#Claimed [1/h]",
         rows,
         definitions.replace(">=", "≥") + ".",
@@ -146,7 +146,7 @@ def _availability(evaluation: Evaluation) -> Table:
                 upward(up.continuity_risk_excluding_gaps, 3),
             )
         )  # fmt: skip
-    confidence = f"{100 * evaluation.settings.confidence:g} %"
+    confidence = f"{percent(evaluation.settings.confidence)}"
     return table(
         "Availability and continuity of the service (demonstrated: counted in this recording)",
         "#Alert limit [m]|#Availability, gaps down|#Availability, gaps left out|#Losses|"

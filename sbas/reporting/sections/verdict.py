@@ -7,8 +7,8 @@ from sbas.integrity.planning import plan_hours
 from sbas.integrity.rate_evidence import NPA_CLAIM, RateEvidence
 from sbas.integrity.results import Evaluation
 from sbas.integrity.sil import NOT_DEMONSTRATED, SIL_BANDS_PER_H, meets, sil_verdict
+from sbas.numerals import count, hours, metres, number, percent, share, upward
 from sbas.reporting.content import Callout, Cell, Section, Table, Tile, table
-from sbas.reporting.numbers import count, hours, metres, number, share, upward
 
 _SIL_3_PER_H = next(above for level, _, above in SIL_BANDS_PER_H if level == 3)
 
@@ -50,7 +50,7 @@ def _met(rate: RateEvidence) -> bool:
 
 
 def _verdict(evaluation: Evaluation, rates: list[RateEvidence]) -> Callout:
-    confidence = f"{100 * evaluation.settings.confidence:g} %"
+    confidence = f"{percent(evaluation.settings.confidence)}"
     claimed = f"{number(NPA_CLAIM.value)} per hour"
     met = [rate.alert_limit_m for rate in rates if _met(rate)]
     unmet = [al for al in evaluation.settings.alert_limits_m if al not in met]
@@ -68,16 +68,17 @@ def _verdict(evaluation: Evaluation, rates: list[RateEvidence]) -> Callout:
         )
     if not rates:
         lines.append("There is no truth for this recording, so no error was formed or counted.")
-    alike: dict[tuple[float, int, float], list[float]] = {}
+    alike: dict[tuple[float, int, int, float, float], list[float]] = {}
     for rate in rates:
         if isinstance(rate.demonstrated, Estimate) and rate.demonstrated.upper is not None:
-            key = (rate.demonstrated.upper, rate.events, rate.hours)
-            alike.setdefault(key, []).append(rate.alert_limit_m)
-    for (upper, events, exposed), limits in alike.items():
+            seen = (rate.events, rate.runs, rate.event_hours, rate.hours)
+            alike.setdefault((rate.demonstrated.upper, *seen), []).append(rate.alert_limit_m)
+    for (upper, events, runs, within, exposed), limits in alike.items():
+        lasting = f", {hours(within)} within them ({count(runs)} runs)" if events else ""
         lines.append(
             f"What is demonstrated at {confidence} confidence: hazardously misleading information "
-            f"(HMI) is rarer than {upward(upper)} per hour for {_listed(limits)}: "
-            f"{count(events)} event{'s' * (events != 1)} in {hours(exposed)} judged."
+            f"(HMI) begins less often than {upward(upper)} times per hour for {_listed(limits)}: "
+            f"{count(events)} event{'s' * (events != 1)}{lasting} in {hours(exposed)} of exposure."
         )
     reasons = {r.demonstrated.reason: r.demonstrated.cure
                for r in rates if isinstance(r.demonstrated, Refusal)}  # fmt: skip
@@ -124,7 +125,7 @@ def _by_limit(evaluation: Evaluation, rates: list[RateEvidence]) -> Table:
     return table(
         "Integrity risk by alert limit (HMI events)",
         f"#Alert limit [m]|#Events|#Hours judged [h]|#Upper bound at "
-        f"{100 * settings.confidence:g} % [1/h]|SIL by that bound|"
+        f"{percent(settings.confidence)} [1/h]|SIL by that bound|"
         f"Claim of {number(NPA_CLAIM.value)} /h",
         rows,
         f"HMI: HPE ≥ alert limit while HPL < alert limit for at least "

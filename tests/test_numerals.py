@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sbas.reporting.numbers import count, downward, hours, number, share, stamp, upward
+from sbas.numerals import count, downward, hours, number, share, stamp, upward
 
 _BACK = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 

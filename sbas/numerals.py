@@ -62,6 +62,18 @@ def hours(value: float, *, rounding: str = ROUND_HALF_EVEN) -> str:
     return f"{number(value * 3600, rounding=rounding)} s"
 
 
+def percent(confidence: float) -> str:
+    """A confidence as per cent, every digit of it: 99.99999 % is not 100 %."""
+    exact = 100 * Decimal(repr(float(confidence)))
+    return f"{_trimmed(exact):f} %"
+
+
+def key(value: float) -> str:
+    """A number as a short key that no other number has: 50 for 50.0, else all digits."""
+    short = f"{value:g}"
+    return short if float(short) == value else repr(float(value))
+
+
 def metres(value: float) -> str:
     """A length to the millimetre."""
     return f"{value:,.3f}"
