@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 import pymap3d
+from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.recording import EpochSource, Recording
+from sbas.recording import COLUMNS, EpochSource, Recording, mode_categories
 from sbas.recording_survey import Survey, survey
 from sbas.timescales import NS_PER_S
 from sbas.truth import FixedPoint, Truth
@@ -224,9 +226,10 @@ def repair(
     if duplicates is not None:
         drop = table.index.duplicated(keep=duplicates)
         if drop.any():
-            table = table[~drop]
+            table, filled = _without_repeated(table, drop)
             text = f"{int(drop.sum())} epochs with a repeated time left out (--duplicates)"
-            made.append(Finding("E26", "info", text, evidence=f"kept the {duplicates}"))
+            evidence = f"kept the {duplicates}; {filled} values of the others that agree used"
+            made.append(Finding("E26", "info", text, evidence=evidence))
     if pl_zero == "missing":
         for name in ("hpl_m", "vpl_m"):
             if name in table and (table[name] <= 0).any():
@@ -235,3 +238,40 @@ def repair(
                 text = f"{int(wrong.sum())} {name} <= 0 made missing (--pl-zero)"
                 made.append(Finding("E26", "info", text))
     return recording.replace(table=table).with_findings(*made)
+
+
+def _without_repeated(table: pd.DataFrame, drop: NDArray[np.bool_]) -> tuple[pd.DataFrame, int]:
+    """The rows that stay, completed from dropped ones of the same time that nowhere differ.
+
+    An epoch whose blocks came twice, or in two files, is then whole again.
+    """
+    kept, dropped = table[~drop], table[drop]
+    target = kept.index.get_indexer(dropped.index)
+    numbers = [n for n in table.columns if n in COLUMNS and COLUMNS[n].dtype in ("f8", "i2")]
+    values = {n: _known_numbers(kept, n) for n in numbers}
+    others = {n: _known_numbers(dropped, n) for n in numbers}
+    differing = np.zeros(len(dropped), bool)
+    for n in numbers:
+        mine = values[n][target]
+        differing |= (mine != others[n]) & ~np.isnan(mine) & ~np.isnan(others[n])
+    filled, changes = 0, {}
+    for n in numbers:
+        usable = ~differing & ~np.isnan(others[n]) & np.isnan(values[n][target])
+        if usable.any():
+            column = kept[n].to_numpy().copy()
+            column[target[usable]] = dropped[n].to_numpy()[usable]
+            changes[n] = column
+            filled += int(usable.sum())
+    if "mode" in table:
+        codes = kept["mode"].cat.codes.to_numpy().copy()
+        other = dropped["mode"].cat.codes.to_numpy()
+        usable = ~differing & (codes[target] < 0) & (other >= 0)
+        codes[target[usable]] = other[usable]
+        changes["mode"] = mode_categories(codes)
+        filled += int(usable.sum())
+    return kept.assign(**changes), filled
+
+
+def _known_numbers(table: pd.DataFrame, name: str) -> NDArray[np.float64]:
+    values: NDArray[np.float64] = table[name].to_numpy().astype(float)
+    return np.where(values == COLUMNS[name].missing, np.nan, values)

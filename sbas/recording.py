@@ -331,6 +331,24 @@ def validate_table(table: pd.DataFrame) -> None:
             )
 
 
+def left_out_levels(table: pd.DataFrame) -> NDArray[np.bool_]:
+    """(n,) True where a protection level is none of the service: the fix was no SBAS fix, or the
+    source declared the level invalid. A mode that nobody stated leaves the level in.
+
+    Parameters
+    ----------
+    table : epochs with the columns `flags` and `mode`.
+    """
+    flagged = (table["flags"].to_numpy() & _LEFT_OUT) != 0
+    codes = table["mode"].cat.codes.to_numpy()
+    inside = np.isin(codes, [-1, *(MODES.index(mode) for mode in SBAS_MODES)])
+    outside: NDArray[np.bool_] = flagged | ~inside
+    return outside
+
+
+_LEFT_OUT = np.uint32(Flag.PL_OUTSIDE_SBAS | Flag.PL_DECLARED_INVALID)
+
+
 def major_semi_axis_m(
     sigma_e_m: NDArray[np.float64], sigma_n_m: NDArray[np.float64], cov_en_m2: NDArray[np.float64]
 ) -> NDArray[np.float64]:

@@ -174,3 +174,22 @@ def test_jittered_stamps_keep_their_interval_and_bounded_memory() -> None:
     time = np.arange(n) + rng.normal(0, 1e-3, n)
     r = recording(np.zeros(n), np.zeros(n), np.full(n, 11.0), time_s=time)
     assert sampling_interval_ns(r) == pytest.approx(S, rel=1e-4)
+
+
+def test_two_halves_of_one_epoch_become_whole() -> None:
+    r = quiet(50)
+    table = r.table.copy()
+    first, second = table.iloc[[20]].copy(), table.iloc[[20]].copy()
+    first["hpl_m"] = np.nan
+    first["n_sv"] = np.int16(-1)
+    second[["lat_deg", "lon_deg", "height_m"]] = np.nan
+    split = pd.concat([table.iloc[:20], first, second, table.iloc[21:]])
+    for keep in ("first", "last"):
+        cured = repair(r.replace(table=split), duplicates=keep)  # type: ignore[arg-type]
+        pd.testing.assert_frame_equal(cured.table, table)
+    second["hpl_m"] = 50.0
+    first["hpl_m"] = 11.0
+    contradicting = pd.concat([table.iloc[:20], first, second, table.iloc[21:]])
+    kept = repair(r.replace(table=contradicting), duplicates="last").table
+    assert kept["hpl_m"].iloc[20] == 50.0
+    assert np.isnan(kept["lat_deg"].iloc[20])

@@ -65,6 +65,8 @@ def evaluate_files(
     Example:  sbas evaluate roof.sbf --truth 50.03,15.77,289.4 --report roof.html
     """
     limits = inputs.alert_limits(alert_limit)
+    if report is not None:
+        inputs.refuse_to_overwrite(report, [*files, *([] if truth is None else [Path(truth)])])
     known = inputs.open_truth(
         truth, frame=frame, antenna_height_m=antenna_height, max_step_s=truth_max_step
     )

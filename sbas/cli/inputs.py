@@ -107,6 +107,15 @@ def open_source(
     )
 
 
+def refuse_to_overwrite(out: Path, files: Sequence[Path]) -> None:
+    """Raise InputError when an output is one of the inputs."""
+    for path in files:
+        if out.exists() and path.exists() and out.samefile(path):
+            raise InputError(
+                "the report would overwrite an input", where=str(out), cure="name another file"
+            )
+
+
 def _one_of(option: str, value: str | None, allowed: tuple[str, ...]) -> None:
     if value is not None and value not in allowed:
         raise InputError(

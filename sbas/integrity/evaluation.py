@@ -165,6 +165,25 @@ def _evaluation(
                 cure="check the truth, and the units in the file's header",
             )
         )
+    if hpe and hpe.max < 1e-6:
+        findings.append(
+            Finding(
+                "E12",
+                "warning",
+                "every error is zero: is the truth the recording itself?",
+                cure="give a truth that was measured independently",
+            )
+        )
+    if hpe and hpe.epochs < tally.positions:
+        findings.append(
+            Finding(
+                "E01",
+                "warning",
+                f"the truth covers {hpe.epochs:,} of {tally.positions:,} epochs with a position",
+                evidence="the others are in no error and in no exposure",
+                cure="give a truth for the whole record, or --truth-max-step",
+            )
+        )
     if truth is not None and not hpe:
         findings.append(
             Finding(

@@ -12,7 +12,7 @@ from sbas.integrity.events import Runs, Stretch, find_runs, join_runs
 from sbas.integrity.position_error import position_errors
 from sbas.integrity.rate_evidence import EventKind
 from sbas.integrity.stanford import REGIONS, stanford_regions
-from sbas.recording import MODES, Flag, major_semi_axis_m
+from sbas.recording import MODES, left_out_levels, major_semi_axis_m
 from sbas.recording_survey import GAP_STEPS, Survey
 from sbas.streaming import DensityGrid, Distribution, ThinnedSeries
 from sbas.truth import Truth
@@ -36,8 +36,6 @@ LEVEL_GRID_M = tuple(np.concatenate([np.arange(1, 201) / 2, np.arange(110, 610, 
 STRIPS = ("hpl_m", "n_sv", "hdop", "hpe_m", "sigma_h_m")
 STRIP_BINS = 1200
 STANFORD_BINS = 200
-
-_LEFT_OUT = Flag.PL_OUTSIDE_SBAS | Flag.PL_DECLARED_INVALID
 
 
 class RunCollector:
@@ -80,7 +78,7 @@ class RecordTally:
         self.alert_limits_m = alert_limits_m
         self.interval_ns = survey.interval_ns
         self.max_step_ns = int(GAP_STEPS * survey.interval_ns)
-        self.epochs = self.judged = self.mi_epochs = self.levels_left_out = 0
+        self.epochs = self.positions = self.judged = self.mi_epochs = self.levels_left_out = 0
         self.covered_ns = self.judged_ns = self.error_ns = self.level_ns = 0
         self.down_ns = dict.fromkeys(alert_limits_m, 0)
         self._last_ns: int | None = None
@@ -109,7 +107,7 @@ class RecordTally:
         stretch = Stretch(batch.index.to_numpy().astype(np.int64), self.max_step_ns)
         covers = self._covered(stretch.time_ns)
         self.covered_ns += int(covers.sum())
-        left_out = (batch["flags"].to_numpy() & _LEFT_OUT) != 0
+        left_out = left_out_levels(batch)
         hpl = np.where(left_out, np.nan, batch["hpl_m"].to_numpy())
         vpl = np.where(left_out, np.nan, batch["vpl_m"].to_numpy())
         self.levels_left_out += int(np.sum(left_out & ~np.isnan(batch["hpl_m"].to_numpy())))
@@ -124,6 +122,7 @@ class RecordTally:
             np.searchsorted(LEVEL_GRID_M, hpl[fix & np.isfinite(hpl)], side="right"),
             minlength=self._level_counts.size,
         )
+        self.positions += int(fix.sum())
         for al in self.alert_limits_m:
             # Written so that a missing level or fix is down.
             down = ~(fix & (hpl < al))
@@ -200,7 +199,7 @@ class RecordTally:
 
     def merge(self, other: RecordTally) -> None:
         """Add the tally of the part of the record that follows."""
-        for name in ("epochs", "judged", "mi_epochs", "levels_left_out", "covered_ns",
+        for name in ("epochs", "positions", "judged", "mi_epochs", "levels_left_out", "covered_ns",
                      "judged_ns", "error_ns", "level_ns"):  # fmt: skip
             setattr(self, name, getattr(self, name) + getattr(other, name))
         for name in ("hpe", "vpe", "hpl", "vpl", "mi", "strips", "scatter"):

@@ -300,6 +300,9 @@ def dilution(raw: Raw, want: Set[str]) -> Decoded:
     for name in ("hpl", "vpl"):
         if f"{name}_m" in want:
             out.columns[f"{name}_m"] = out.floats(f"{name}_m", raw[name])
+            if "error" in raw:
+                level, failed = out.columns[f"{name}_m"], np.asarray(raw["error"]) != 0
+                out.remove(f"{name}_m", "value beside an error code", failed, level)
             if "flags" in want:
                 out.add_flags(Flag.PL_SENTINEL, raw[name] <= sbf.FLOAT_MISSING_BELOW)
     if "n_sv" in want:

@@ -92,7 +92,8 @@ def write(
     RAIMStatistics (4011), the SBAS frames up to that time (4020, 4021) and EndOfPVT (5921).
     Resolutions: DOP and age 0.01, protection levels and velocities float32, sigmas the square
     root of a float32 variance. Not held by SBF: `speed_mps` without the velocity, tracked
-    satellites, environment, hardware faults, and a mode that is missing (it becomes "other").
+    satellites, environment, hardware faults. A mode that is missing cannot be written beside a
+    level or a position, since its epoch would come back as one outside SBAS.
 
     Parameters
     ----------
@@ -156,6 +157,13 @@ def _epoch_blocks(table: pd.DataFrame) -> NDArray[np.uint8]:
     column = {name: table[name].to_numpy() for name in _COLUMNS if name != "mode"}
     stamps = _stamps(table.index.to_numpy())
     mode = table["mode"].cat.codes.to_numpy()
+    stated = ~np.isnan(column["hpl_m"]) | ~np.isnan(column["lat_deg"])
+    if np.any((mode < 0) & stated):
+        raise InputError(
+            "SBF cannot hold an epoch whose mode is not known",
+            where=f"{int(np.sum((mode < 0) & stated)):,} epochs",
+            cure="state the column `mode`, or write Parquet",
+        )
     flags = column["flags"]
     n_sv, geo = column["n_sv"], column["geo_prn"]
     lost = np.isnan(column["lat_deg"]) | np.isnan(column["lon_deg"])

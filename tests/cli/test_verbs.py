@@ -314,3 +314,9 @@ def test_the_real_sbf_files_read_and_every_analysis_refuses(
     assert "E15" in [f["code"] for f in checked.json["findings"]]
     for verb in (("evaluate",), ("rate", "--alert-limit", "25")):
         assert Answer(capsys, *verb, path).code == 2
+
+
+def test_a_report_never_overwrites_an_input(capsys: pytest.CaptureFixture[str], roof: Path) -> None:
+    before = roof.read_bytes()
+    assert Answer(capsys, "evaluate", roof, *TRUTH, "--report", roof).code == 2
+    assert roof.read_bytes() == before

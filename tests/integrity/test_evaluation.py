@@ -14,6 +14,7 @@ from sbas.integrity.evaluation import evaluate
 from sbas.integrity.position_error import position_errors
 from sbas.integrity.stanford import REGIONS, stanford_regions
 from sbas.recording import Flag, Recording
+from sbas.truth import Trajectory
 from tests.examples import POINT, quiet, recording
 
 
@@ -248,3 +249,20 @@ def test_close_alert_limits_keep_their_results() -> None:
     limits = [25.0000001, 25.0, 24.9999]
     plain = evaluate(quiet(100), truth=POINT, alert_limits_m=limits).to_dict()["alert_limits"]
     assert [entry["alert_limit_m"] for entry in plain.values()] == limits
+
+
+def test_a_level_beside_another_mode_is_left_out_though_no_flag_says_so() -> None:
+    zero = np.zeros(100)
+    r = recording(zero, zero, zero + 11.0, mode="standalone")
+    assert "flags" not in r.table
+    result = evaluate(r, truth=POINT)
+    assert result.hpl_m is None
+    assert result.at(50.0).availability.availability.value == 0.0
+
+
+def test_a_truth_that_ends_early_is_said() -> None:
+    r = quiet(200)
+    track = r.table[["lat_deg", "lon_deg", "height_m"]].iloc[:120]
+    findings = evaluate(r, truth=Trajectory(track, frame="x")).findings
+    assert any("120 of 200" in f.message for f in findings)
+    assert any("every error is zero" in f.message for f in findings)

@@ -121,7 +121,7 @@ def test_all_missing(tmp_path: Path) -> None:
     floats = got.table.select_dtypes("f8")
     assert floats.isna().all(axis=None)
     assert (got.table[["n_sv", "geo_prn"]] == -1).all(axis=None)
-    assert set(got.table["mode"]) == {"other"}  # a missing mode has no code in SBF
+    assert set(got.table["mode"]) == {"other"}  # nothing stands beside it
     assert got.table["flags"].tolist() == [Flag.PL_SENTINEL | Flag.POSITION_SENTINEL] * 4
 
 
@@ -233,3 +233,9 @@ def test_encode_blocks_refuses_what_it_does_not_know() -> None:
 
 def test_every_written_column_is_one_that_the_reader_fills(tmp_path: Path) -> None:
     assert round_trip([recording(3)], tmp_path).columns == FILLED
+
+
+def test_a_level_without_a_mode_is_not_written(tmp_path: Path) -> None:
+    table = recording(3).table.drop(columns="mode")
+    with pytest.raises(InputError, match="mode is not known"):
+        write([Recording(table)], tmp_path / "x.sbf")
