@@ -17,9 +17,12 @@ from sbas.integrity import (
     evaluate,
     failure_rate,
     k_factor,
+    k_models,
+    k_verdict,
     load_allocation,
     plan_hours,
     position_errors,
+    railway_hpl,
 )
 from sbas.laboratory import simulate
 from sbas.logs import read, read_truth_table, scan
@@ -43,9 +46,12 @@ __all__ = [
     "evaluate",
     "failure_rate",
     "k_factor",
+    "k_models",
+    "k_verdict",
     "load_allocation",
     "plan_hours",
     "position_errors",
+    "railway_hpl",
     "read",
     "read_truth_table",
     "repair",

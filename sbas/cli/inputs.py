@@ -34,7 +34,7 @@ TruthText = Annotated[
     ),
 ]
 Frame = Annotated[
-    str, typer.Option("--frame", help="Reference frame of the truth; unstated, 1 m is allowed.")
+    str, typer.Option("--frame", help="Reference frame of the truth; unstated, errors may be wrong by 1 m.")
 ]
 AntennaHeight = Annotated[
     float,

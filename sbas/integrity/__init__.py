@@ -2,16 +2,22 @@
 
 from sbas.integrity.allocation import load_allocation
 from sbas.integrity.evaluation import evaluate
+from sbas.integrity.exposure_models import k_models
 from sbas.integrity.failure_rates import failure_rate
 from sbas.integrity.k_factors import k_factor
+from sbas.integrity.k_verdicts import k_verdict
 from sbas.integrity.planning import plan_hours
 from sbas.integrity.position_error import position_errors
+from sbas.integrity.railway_levels import railway_hpl
 
 __all__ = [
     "evaluate",
     "failure_rate",
     "k_factor",
+    "k_models",
+    "k_verdict",
     "load_allocation",
     "plan_hours",
     "position_errors",
+    "railway_hpl",
 ]

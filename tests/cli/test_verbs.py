@@ -320,3 +320,17 @@ def test_a_report_never_overwrites_an_input(capsys: pytest.CaptureFixture[str], 
     before = roof.read_bytes()
     assert Answer(capsys, "evaluate", roof, *TRUTH, "--report", roof).code == 2
     assert roof.read_bytes() == before
+
+
+def test_kfactor_over_an_exposure(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ("kfactor", "--risk", "5e-8", "--exposure-s", "3600", "--tau-s", "360")
+    plain = Answer(capsys, *asked, "--interval-s", "1", "--json").json
+    assert plain["k"] == pytest.approx(6.7236, rel=1e-4)
+    assert set(plain["models"]) == {"naive", "ar1", "ou", "ou_dt", "rice"}
+    assert plain["models"]["naive"]["k"] == pytest.approx(6.1829, rel=1e-4)
+    assert plain["models"]["rice"]["k"] == pytest.approx(6.4562, rel=1e-4)
+    assert {"k", "n_es", "hourly_risk_of_6_18"} <= plain["models"]["ar1"].keys()
+    assert "6.723" in Answer(capsys, *asked).out
+    for wrong in (("--tau-s", "0.5"), ("--nugget", "2"), ("--one-sided",)):
+        assert Answer(capsys, *asked, *wrong).code == 2
+    assert Answer(capsys, "kfactor", "--risk", "5e-8", "--tau-s", "360").code == 2
