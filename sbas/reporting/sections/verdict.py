@@ -124,7 +124,7 @@ def _by_limit(evaluation: Evaluation, rates: list[RateEvidence]) -> Table:
     settings = evaluation.settings
     return table(
         "Integrity risk by alert limit (HMI events)",
-        f"#Alert limit [m]|#Events|#Hours judged [h]|#Upper bound at "
+        f"#Alert limit [m]|#Events|#Exposure [h]|#Upper bound at "
         f"{percent(settings.confidence)} [1/h]|SIL by that bound|"
         f"Claim of {number(NPA_CLAIM.value)} /h",
         rows,
