@@ -71,7 +71,7 @@ def test_orbits_are_circles_of_half_a_sidereal_day():
     assert np.hypot(np.hypot(x, y), z) == pytest.approx(SEMI_MAJOR_AXIS_M, rel=1e-11)
     highest = SEMI_MAJOR_AXIS_M * np.sin(np.radians(INCLINATION_DEG))
     assert z.max() == pytest.approx(highest, rel=1e-4)
-    half = satellite_enu_m(harmonics, times + np.timedelta64(round(SIDEREAL_DAY_S / 2 * 1e9)))
+    half = satellite_enu_m(harmonics, times + np.timedelta64(round(SIDEREAL_DAY_S / 2 * 1e9), "ns"))
     assert pymap3d.enu2ecef(*half, 50.03, 15.77, 289.4)[2] == pytest.approx(z, abs=1)
 
 
