@@ -33,6 +33,7 @@ CODES: dict[str, str] = {
     "E18": "line too long for text",
     "E19": "text encoding repaired",
     "E20": "decimal comma",
+    "E21": "decoded size out of proportion",
     "E23": "protection levels that DO-229 does not define",
     "E24": "bytes that belong to no valid block",
     "E25": "metadata missing, unreadable or contradicted",

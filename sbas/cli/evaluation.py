@@ -68,7 +68,12 @@ def evaluate_files(
     if report is not None:
         inputs.refuse_to_overwrite(report, [*files, *([] if truth is None else [Path(truth)])])
     known = inputs.open_truth(
-        truth, frame=frame, antenna_height_m=antenna_height, max_step_s=truth_max_step
+        truth,
+        frame=frame,
+        antenna_height_m=antenna_height,
+        max_step_s=truth_max_step,
+        time_scale=time_scale,
+        geoid=geoid,
     )
     source = inputs.open_source(
         files,
@@ -172,7 +177,12 @@ def rate(
             f"unknown event {event!r}", cure=f"--event with one of {', '.join(EVENT_KINDS)}"
         )
     known = inputs.open_truth(
-        truth, frame=frame, antenna_height_m=antenna_height, max_step_s=truth_max_step
+        truth,
+        frame=frame,
+        antenna_height_m=antenna_height,
+        max_step_s=truth_max_step,
+        time_scale=time_scale,
+        geoid=geoid,
     )
     source = inputs.open_source(
         files,

@@ -34,7 +34,10 @@ TruthText = Annotated[
     ),
 ]
 Frame = Annotated[
-    str, typer.Option("--frame", help="Reference frame of the truth; unstated, errors may be wrong by 1 m.")
+    str,
+    typer.Option(
+        "--frame", help="Reference frame of the truth; unstated, errors may be wrong by 1 m."
+    ),
 ]
 AntennaHeight = Annotated[
     float,
@@ -135,21 +138,32 @@ def _pairs(text: str) -> dict[str, str]:
 
 
 def open_truth(
-    text: str | None, *, frame: str = "", antenna_height_m: float = 0.0, max_step_s: float = 1.0
+    text: str | None,
+    *,
+    frame: str = "",
+    antenna_height_m: float = 0.0,
+    max_step_s: float = 1.0,
+    time_scale: str | None = None,
+    geoid: float | None = None,
 ) -> Truth | None:
-    """The truth from `LAT,LON,H` or from a trajectory file; None where nothing was given."""
+    """The truth from `LAT,LON,H` or from a trajectory file; None where nothing was given.
+
+    `time_scale` and `geoid` serve a file that does not say its time scale, and heights above
+    the geoid.
+    """
     if text is None:
         return None
     numbers = _three_numbers(text)
     if numbers is not None:
         return FixedPoint(*numbers, antenna_height_m=antenna_height_m, frame=frame)
     path = Path(text)
-    if not path.is_file():
+    if not path.exists():
         raise InputError(
             f"--truth {text!r} is neither LAT,LON,HEIGHT nor a file",
             cure="--truth 50.03,15.77,289.4 (degrees and metres above the ellipsoid)",
         )
-    return Trajectory(read_truth_table(path), antenna_height_m, max_step_s, frame=frame)
+    table = read_truth_table(path, time_scale=time_scale, geoid=geoid)  # type: ignore[arg-type]
+    return Trajectory(table, antenna_height_m, max_step_s, frame=frame)
 
 
 def _three_numbers(text: str) -> tuple[float, float, float] | None:

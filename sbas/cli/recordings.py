@@ -71,7 +71,8 @@ def check_files(
             )
             output.print_json({"epochs": 0, "format": None, "findings": [finding.to_dict()]})
         raise
-    result = check(source, truth=inputs.open_truth(truth))
+    known = inputs.open_truth(truth, time_scale=time_scale, geoid=geoid)
+    result = check(source, truth=known)
     if json:
         output.print_json(result.to_dict())
     else:

@@ -1,4 +1,4 @@
-"""How the lines of delimited text are built: delimiter, header line, decimal sign."""
+"""How the lines of delimited text are built: delimiter, header line, units, decimal sign."""
 
 from __future__ import annotations
 
@@ -8,9 +8,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from sbas.exceptions import InputError
-from sbas.logs.column_map import map_headers
+from sbas.logs.column_names import (
+    TIME_PARTS,
+    TRUTH_COLUMNS,
+    known_names,
+    map_headers,
+    refuse_too_many,
+    with_unit,
+)
 
 SAMPLE_LINES = 50
+DELIMITERS = (" ", ",", "\t", ";")
+
+_NO_UNIT = re.compile(r"[-\s.]*|nan|-nan|n/?a|#n/a|null|none", re.IGNORECASE)
+_DATE_PATTERN = re.compile(r"[ymdhsfz:/.\-_ t%]*", re.IGNORECASE)
+_WORDS = ("week", "mode", "environment", "hardware_fault", "flags")
 
 
 @dataclass(frozen=True)
@@ -20,14 +32,16 @@ class Layout:
     Parameters
     ----------
     delimiter, decimal : one character each.
-    headers : one name a field.
-    header_line : index of the header line; data begin behind it.
+    headers : one name a field, with its unit where a line of units says it.
+    header_line : index of the last line before the data: the header, or its line of units.
+    written : fields of the header line, and of the line of units, as they stand in the file.
     """
 
     delimiter: str
     headers: tuple[str, ...]
     header_line: int
     decimal: str = "."
+    written: tuple[tuple[str, ...], ...] = ()
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -38,6 +52,17 @@ def split_line(line: str, delimiter: str) -> list[str]:
         return next(csv.reader([line], delimiter=delimiter, strict=False), [])
     except csv.Error:
         return line.split(delimiter)
+
+
+def header_fields(line: str, delimiter: str) -> tuple[str, ...]:
+    """Fields of a header, which may stand in a comment or behind a byte order mark."""
+    return tuple(split_line(line.lstrip("#% \ufeff").strip("\r\n"), delimiter))
+
+
+def bare_fields(fields: Sequence[str]) -> tuple[str, ...]:
+    """Fields without blanks around them and without an empty last one, for comparison."""
+    bare = tuple(field.strip() for field in fields)
+    return bare[:-1] if bare and not bare[-1] else bare
 
 
 def data_rows(text: str, layout: Layout) -> list[list[str]]:
@@ -53,10 +78,11 @@ def whole_lines(text: str) -> list[str]:
 
 
 def find_layout(text: str, *, where: str) -> Layout:
-    """Delimiter, header and decimal sign of delimited text.
+    """Delimiter, header, units and decimal sign of delimited text.
 
     The header is the first line that is no comment, or the comment line before the data; that
-    pair of header and delimiter is taken which names most known columns.
+    pair of header and delimiter is taken which names most known columns. The line right below
+    it may give units.
 
     Parameters
     ----------
@@ -65,7 +91,8 @@ def find_layout(text: str, *, where: str) -> Layout:
 
     Raises
     ------
-    InputError : no header with two fields or more, or lines with other counts than the header.
+    InputError : no header with two fields or more, more than MAX_COLUMNS of them, lines with
+        other counts than the header, or units that contradict the header.
     """
     lines = whole_lines(text)
     plain = [i for i, s in enumerate(lines) if s.strip() and not s.lstrip().startswith(("#", "%"))]
@@ -74,16 +101,17 @@ def find_layout(text: str, *, where: str) -> Layout:
     candidates += [i for i in comments if plain and i < plain[0]][-1:]
     best: tuple[tuple[int, float, int], Layout] | None = None
     for at in candidates:
-        for rank, delimiter in enumerate((" ", ",", "\t", ";")):
-            names = tuple(split_line(lines[at].lstrip("#% \ufeff").strip("\r\n"), delimiter))
+        for rank, delimiter in enumerate(DELIMITERS):
+            names = header_fields(lines[at], delimiter)
             if len(names) < 2:
                 continue
-            layout = Layout(delimiter, names, at)
+            refuse_too_many(len(names), where=where)
+            layout = Layout(delimiter, names, at, written=(bare_fields(names),))
             rows = data_rows(text, layout)
             if rows and all(len(r) == len(names) + 1 and not r[-1].strip() for r in rows):
-                layout = Layout(delimiter, (*names, ""), at)
+                layout = replace(layout, headers=(*names, ""))
             fitting = sum(len(r) == len(layout.headers) for r in rows) / max(len(rows), 1)
-            score = (_known_count(names), fitting, rank)
+            score = (len(known_names(names)), fitting, rank)
             if best is None or score > best[0]:
                 best = score, layout
     if best is None:
@@ -110,18 +138,71 @@ def find_layout(text: str, *, where: str) -> Layout:
             if comma
             else "give every field a name in the header",
         )
+    layout = with_line_of_units(lines, layout, where)
     if layout.delimiter in ";\t":
-        cells = [cell for row in rows for cell in row]
+        cells = [cell for row in data_rows(text, layout) for cell in row]
         if any(re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cell) for cell in cells):
             layout = replace(layout, decimal=",")
     return layout
 
 
-def _known_count(names: Sequence[str]) -> int:
-    count = 0
-    for name in names:
-        try:
-            count += bool(map_headers([name], where="")[0])
-        except InputError:
-            count += 1
-    return count
+def names_columns(fields: Sequence[str]) -> bool:
+    """Whether the fields of a line are a header: a time and another known column."""
+    names = set(known_names([field.strip() for field in fields]))
+    timed = "time" in names or {"week", "tow"} <= names
+    return timed and bool(names - set(TIME_PARTS))
+
+
+def with_line_of_units(lines: Sequence[str], layout: Layout, where: str) -> Layout:
+    """The layout with the units of the line right below its header, where that is such a line.
+
+    A line of words in the place of numbers is one: units that do not belong to their columns
+    are then refused as those in headers are.
+    """
+    at = next((i for i in range(layout.header_line + 1, len(lines)) if lines[i].strip()), None)
+    if at is None:
+        return layout
+    fields = header_fields(lines[at], layout.delimiter)
+    cells = [field.strip().strip("[]()").strip() for field in fields]
+    if len(cells) != len(layout.headers) or names_columns(fields):
+        return layout
+    if any(re.search(r"\d", re.sub(r"(?<=m)\^?2$|^1$", "", cell)) for cell in cells):
+        return layout
+    headers = list(layout.headers)
+    numbers = 0
+    for index, (header, cell) in enumerate(zip(layout.headers, cells, strict=True)):
+        name = next(iter(known_names([header], extra=TRUTH_COLUMNS)), None)
+        timed = name in ("time", "date")
+        if name is None or name in _WORDS or (_DATE_PATTERN if timed else _NO_UNIT).fullmatch(cell):
+            continue
+        numbers += not timed
+        stated, said = with_unit(header, cell)
+        if not said:
+            headers[index] = stated
+        elif said.lower() != cell.lower() and _factor(stated) != _factor(header):
+            raise InputError(
+                f"column {header!r} and the line of units below it name two units",
+                where=f"{where}, line {at + 1}",
+                evidence=f"{said!r} and {cell!r}",
+                cure="correct one of them",
+            )
+    if not numbers:
+        return layout
+    comment = lines[at].lstrip().startswith(("#", "%"))
+    try:
+        map_headers(headers, where=f"{where}, line {at + 1}", extra=TRUTH_COLUMNS)
+    except InputError:
+        if comment:  # a remark that happens to have as many words as there are columns
+            return layout
+        raise
+    return replace(
+        layout,
+        headers=tuple(headers),
+        header_line=at,
+        written=(*layout.written, bare_fields(fields)),
+    )
+
+
+def _factor(header: str) -> float | None:
+    mapped, _ = map_headers([header], where="line of units", extra=TRUTH_COLUMNS)
+    return next((column.factor for column in mapped.values()), None)

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NoReturn
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
-from sbas.logs.column_map import (
+from sbas.logs.column_names import (
     TIME_PARTS,
     MappedColumn,
     map_headers,
     needed_columns,
 )
-from sbas.logs.delimited_layout import Layout, data_rows
+from sbas.logs.delimited_layout import (
+    DELIMITERS,
+    Layout,
+    bare_fields,
+    data_rows,
+    header_fields,
+    names_columns,
+    with_line_of_units,
+)
 from sbas.logs.text_input import (
     collapse_blanks,
     parse_lines,
@@ -33,6 +41,11 @@ from sbas.logs.time_stamps import (
 
 _TEXT_COLUMNS = ("time", "date", "mode", "environment", "hardware_fault")
 _COMMENT_LINE = re.compile(rb"^[ \t]*[#%][^\n]*\n?", re.MULTILINE)
+_TIME_WORD = re.compile(rb"time|gpst|utc|week", re.IGNORECASE)
+_LONGEST_HEADER_LINE = 1 << 14
+_DECIMAL_CURE = (
+    "write all numbers with a decimal point, or separate fields by ';' and write all with a comma"
+)
 
 
 @dataclass(frozen=True)
@@ -46,6 +59,7 @@ class Part:
     example: str
     unreadable: dict[str, int] = field(default_factory=dict)
     words: dict[str, int] = field(default_factory=dict)
+    repeated_headers: int = 0
 
 
 @dataclass(frozen=True)
@@ -102,17 +116,89 @@ class LineReader:
                 code="E20",
                 where=self.where,
                 evidence=", ".join([*commas[:2], *points[:2]]),
-                cure="write all numbers with a decimal point, or separate fields by ';' and "
-                "write all with a comma",
+                cure=_DECIMAL_CURE,
             )
 
     def _column(self, name: str) -> MappedColumn:
         return self.mapped[name] if name in self.mapped else self.others[name]
 
     def block(self, block: bytes) -> Part:
-        """Columns of one block of lines; lines without a readable time are left out."""
-        if b"#" in block or b"%" in block:
-            block = _COMMENT_LINE.sub(b"", block)
+        """Columns of one block of lines; lines without a readable time are left out.
+
+        Raises
+        ------
+        InputError : E06 where the block has a header that is not that of the file (two files
+            were joined); E20 where a number has the other decimal sign.
+        """
+        commented = b"#" in block or b"%" in block
+        bare = _COMMENT_LINE.sub(b"", block) if commented else block
+        part = self._parsed(bare)
+        if not (part.bad_lines or commented) or not _TIME_WORD.search(block):
+            return part
+        # A header has no readable time: lines are looked at one by one only where one has none.
+        texts = block.splitlines(keepends=True)
+        if not part.bad_lines and not any(
+            self._repeats_header(comment[0]) for comment in _COMMENT_LINE.finditer(block)
+        ):
+            return part
+        kept, headers = self._without_headers(texts)
+        if not headers:
+            return part
+        return replace(
+            self._parsed(_COMMENT_LINE.sub(b"", b"".join(kept))), repeated_headers=headers
+        )
+
+    def _without_headers(self, lines: Sequence[bytes]) -> tuple[list[bytes], int]:
+        """The lines without repetitions of the header and of its line of units, and their count."""
+        kept = []
+        headers = 0
+        above = b""
+        for line in lines:
+            if self._repeats_header(line):
+                headers += 1
+                above = line
+                continue
+            if above:
+                pair = [text.decode("utf-8") for text in (above, line)]
+                names = header_fields(pair[0], self.layout.delimiter)
+                names += ("",) * (len(self.layout.headers) - len(names))
+                first = Layout(self.layout.delimiter, names, 0, written=(bare_fields(names),))
+                again = with_line_of_units(pair, first, self.where)
+                if again.written != self.layout.written:
+                    self._refuse_layout(above + line)
+                above = b""
+                if len(again.written) > 1:
+                    continue
+            kept.append(line)
+        return kept, headers
+
+    def _repeats_header(self, line: bytes) -> bool:
+        """Whether a line is the header once more; InputError where it is another header."""
+        if len(line) > _LONGEST_HEADER_LINE or not _TIME_WORD.search(line):
+            return False
+        text = line.decode("utf-8")
+        for delimiter in (d for d in DELIMITERS if d in text):
+            fields = bare_fields(header_fields(text, delimiter))
+            if names_columns(fields):
+                if delimiter != self.layout.delimiter or fields != self.layout.written[0]:
+                    self._refuse_layout(line)
+                return True
+        return False
+
+    def _refuse_layout(self, line: bytes) -> NoReturn:
+        shown = line.decode("utf-8").strip()
+        raise InputError(
+            "the file holds tables of two layouts: a later header is not the first one",
+            code="E06",
+            where=self.where,
+            evidence=f"{self._shown()[:150]!r} and {shown[:150]!r}",
+            cure="split it at the second header and give the parts as separate files",
+        )
+
+    def _shown(self) -> str:
+        return "\n".join(self.layout.delimiter.join(fields) for fields in self.layout.written)
+
+    def _parsed(self, block: bytes) -> Part:
         if self.layout.delimiter == " ":
             block = collapse_blanks(plain_blanks(block))
         times = tuple(name for name in TIME_PARTS if name in self.mapped)
@@ -126,6 +212,17 @@ class LineReader:
             delimiter=self.layout.delimiter,
             decimal=self.layout.decimal,
         )
+        if fields.other_decimal:
+            raise InputError(
+                "decimal comma and decimal point in one file"
+                if self.layout.delimiter in ";\t"
+                else "decimal commas, with blanks or commas between the fields",
+                code="E20",
+                where=self.where,
+                evidence=f"{fields.other_decimal!r}, though the decimal sign of the file is "
+                f"{self.layout.decimal!r}",
+                cure=_DECIMAL_CURE,
+            )
         back = {i: name for name, i in index.items()}
         numbers = {back[i]: v for i, v in fields.numbers.items()}
         text = {back[i]: v for i, v in fields.texts.items()}

@@ -19,15 +19,15 @@ from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.logs.column_map import (
+from sbas.logs.column_map import MappedTable, convert_columns, word_findings
+from sbas.logs.column_names import (
     TIME_CURE,
     TIME_PARTS,
-    MappedTable,
     applied_geoid,
-    convert_columns,
+    header_sources,
     map_headers,
     map_text,
-    word_findings,
+    no_level_finding,
 )
 from sbas.logs.delimited_layout import Layout, data_rows, find_layout, split_line
 from sbas.logs.delimited_lines import LineReader, Part
@@ -86,7 +86,7 @@ def read(
         time_scale=mapped.time_scale,
         leap_seconds=mapped.leap_seconds,
         geoid=mapped.geoid,
-        findings=mapped.findings,
+        findings=(*mapped.findings, *no_level_finding(mapped.sources)),
         options=mapped.options,
     )
     table = mapped.table if columns is None else with_columns(mapped.table, columns)
@@ -159,7 +159,8 @@ def _joined(
         )
     if not rows:
         raise InputError(
-            "no line has a readable time" if bad else "E15: the file has a header and no data",
+            "no line has a readable time" if bad else "the file has a header and no data",
+            code="" if bad else "E15",
             where=reader.where,
             evidence=example,
             cure=TIME_CURE if bad else "check that the recording was written",
@@ -208,6 +209,8 @@ def _joined(
     findings = (
         *blocks.findings(),
         *_decimal_finding(reader.layout),
+        *_units_finding(reader.layout),
+        *_repeated_finding(sum(part.repeated_headers for part in parts)),
         *bad_line_finding(bad, rows, example),
         *_unreadable_findings(parts, rows),
         *scale_findings,
@@ -222,7 +225,8 @@ def _joined(
         options["mode_map"] = ", ".join(f"{word}={name}" for word, name in mode_map.items())
     table = pd.DataFrame(columns, index=pd.DatetimeIndex(times, name="time"))
     geoid_text = applied_geoid(geoid, reader.wanted)
-    return MappedTable(table, findings, scale, leap_seconds, options, geoid_text)
+    sources = header_sources(reader.mapped, reader.others)
+    return MappedTable(table, findings, scale, leap_seconds, options, geoid_text, sources)
 
 
 def _summed(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
@@ -259,6 +263,29 @@ def _decimal_finding(layout: Layout) -> tuple[Finding, ...]:
             "commas in numbers were read as decimal commas",
             evidence=f"fields are separated by {layout.delimiter!r}",
             cure="write numbers with a decimal point",
+        ),
+    )
+
+
+def _units_finding(layout: Layout) -> tuple[Finding, ...]:
+    if len(layout.written) < 2:
+        return ()
+    shown = layout.delimiter.join(layout.written[1])
+    return (
+        Finding("E26", "info", "the line below the header was read as units", evidence=shown[:300]),
+    )
+
+
+def _repeated_finding(count: int) -> tuple[Finding, ...]:
+    if not count:
+        return ()
+    return (
+        Finding(
+            "E26",
+            "info",
+            "the header stands again among the data and was left out",
+            evidence=f"{count:,} times",
+            cure="give joined files one by one: sbas tells then whether they belong together",
         ),
     )
 
@@ -303,7 +330,8 @@ def sniff(head: bytes, middle: bytes, tail: bytes, path: Path) -> Match:
         layout = find_layout(text, where=str(path))
         mapped, _ = map_headers(layout.headers, where=str(path))
     except InputError as error:
-        likely = 25 if error.what.startswith(("E20", "two columns")) or "unit" in error.what else 0
+        named = error.what.startswith("two columns") or "unit" in error.what
+        likely = 25 if named or error.code in ("E18", "E20") else 0
         return Match(likely, f"text, but {error.what}")
     timed = "time" in mapped or ("week" in mapped and "tow" in mapped)
     if timed and "lat_deg" in mapped and "lon_deg" in mapped:

@@ -24,12 +24,21 @@ from sbas.exceptions import InputError
 from sbas.findings import Finding
 from sbas.logs.format import Format, Match, Progress
 from sbas.logs.parquet_foreign import read_foreign
+from sbas.logs.parquet_tables import (
+    count_impossible_levels,
+    impossible_levels,
+    one_array,
+    refuse_memory,
+    words,
+)
 from sbas.logs.parquet_writer import LAYOUT_KEY, META_KEY, TIME_TYPE, Layout, sha256_of, write
+from sbas.logs.sentinels import sentinel_findings
 from sbas.recording import (
     BATCH_ROWS,
     COLUMNS,
     MODES,
     EpochSource,
+    Flag,
     Recording,
     RecordingMeta,
     Source,
@@ -76,8 +85,7 @@ def read(
         return source
     wanted = source.columns if columns is None else tuple(columns)
     with opened(path) as file:
-        present = ["time", *(name for name in wanted if name in source.columns)]
-        table = file.read(columns=present).unify_dictionaries().combine_chunks()
+        table = file.read(columns=source.needed(wanted)).unify_dictionaries().combine_chunks()
         frame = with_columns(_frame(table, source.categories, path), wanted)
         side_tables, findings = _side_tables(path, _layout(file, path))
     if progress is not None:
@@ -123,7 +131,7 @@ def scan(
         layout = _layout(file, path)
         meta = _meta(text, layout, path)
         rows = file.metadata.num_rows
-        findings = []
+        findings: list[Finding] = []
         if rows != layout.rows:
             findings.append(
                 Finding(
@@ -137,8 +145,10 @@ def scan(
             )
         names = tuple(name for name in schema.names if name != "time")
         _check_schema(schema, path)
+        impossible = count_impossible_levels(file)
+        findings += sentinel_findings({n: {"65535 or more": k} for n, k in impossible.items()})
     meta = replace(meta, findings=(*meta.findings, *findings))
-    return ParquetEpochs(path, meta, names, rows, layout.categories, progress)
+    return ParquetEpochs(path, meta, names, rows, layout.categories, progress, bool(impossible))
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +162,7 @@ class ParquetEpochs:
     rows : epochs.
     categories : names of each categorical column.
     progress : called with bytes done and in all.
+    repairing : whether levels are made missing, which shows in the flags.
     """
 
     path: Path
@@ -160,13 +171,14 @@ class ParquetEpochs:
     rows: int
     categories: Mapping[str, Sequence[str]]
     progress: Progress | None = None
+    repairing: bool = False
 
     def __len__(self) -> int:
         return self.rows
 
     def batches(self, columns: Sequence[str]) -> Iterator[pd.DataFrame]:
         """Tables of at most BATCH_ROWS epochs in file order; only these columns are decoded."""
-        present = ["time", *(name for name in columns if name in self.columns)]
+        present = self.needed(columns)
         size = self.path.stat().st_size
         done = 0
         with opened(self.path) as file:
@@ -179,6 +191,13 @@ class ParquetEpochs:
             if not done:
                 empty = file.schema_arrow.empty_table().select(present)
                 yield with_columns(_frame(empty, self.categories, self.path), columns)
+
+    def needed(self, columns: Sequence[str]) -> list[str]:
+        """Columns to decode for those asked: with the flags, the levels that change them."""
+        asked = set(columns)
+        if self.repairing and "flags" in asked:
+            asked |= {"hpl_m", "vpl_m"}
+        return ["time", *(name for name in self.columns if name in asked)]
 
 
 def _batches(file: pq.ParquetFile, columns: Sequence[str]) -> Iterator[Any]:
@@ -194,6 +213,8 @@ def opened(path: Path) -> Iterator[pq.ParquetFile]:
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             yield file
+    except MemoryError as error:
+        refuse_memory(path, error)
     except _DAMAGE as error:
         _damaged(path, error)
 
@@ -298,20 +319,36 @@ def _frame(table: pa.Table, categories: Mapping[str, Sequence[str]], path: Path)
         for name in table.column_names
         if name != "time"
     }
+    for name in ("hpl_m", "vpl_m"):
+        if name in columns and (impossible := impossible_levels(columns[name])).any():
+            columns[name] = np.where(impossible, np.nan, columns[name])
+            if "flags" in columns:
+                added = np.where(impossible, np.uint32(Flag.PL_SENTINEL), np.uint32(0))
+                columns["flags"] = columns["flags"] | added
     return pd.DataFrame(columns, index=index)
 
 
 def _values(name: str, column: Any, categories: Sequence[str] | None, path: Path) -> Any:
     """Values of a column in its documented dtype."""
-    array = column.combine_chunks()
-    if isinstance(array, pa.ChunkedArray):
-        array = pa.concat_arrays(array.chunks) if array.num_chunks else pa.array([], array.type)
+    array = one_array(column)
     known = COLUMNS.get(name)
+    if known is not None and known.dtype == "category" and not pa.types.is_dictionary(array.type):
+        array = words(array, header=name, where=str(path)).dictionary_encode()
+    if (
+        known is not None
+        and known.dtype not in ("bool", "category")
+        and pa.types.is_boolean(array.type)
+    ):
+        raise InputError(
+            f"column {name!r} holds truth values where numbers should be",
+            where=str(path),
+            cure="write the recording again",
+        )
     try:
         if pa.types.is_dictionary(array.type) and (known is None or known.dtype == "category"):
             names = list(MODES) if name == "mode" else categories
             return _categorical(name, array, names, path)
-        if known is None or known.dtype == "category":
+        if known is None:
             return array.to_pandas().array  # without an index, which would be aligned
         if known.dtype == "f8":
             return array.cast(pa.float64()).to_numpy(zero_copy_only=False)

@@ -14,16 +14,26 @@ import pyarrow.parquet as pq
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.logs.column_map import (
+from sbas.logs.column_map import MappedTable, convert_columns
+from sbas.logs.column_names import (
     TIME_CURE,
-    MappedTable,
+    MappedColumn,
     applied_geoid,
-    convert_columns,
+    header_sources,
     map_headers,
     map_text,
     needed_columns,
+    no_level_finding,
 )
 from sbas.logs.format import Progress
+from sbas.logs.parquet_tables import (
+    is_number,
+    is_text,
+    one_array,
+    read_columns,
+    value_type,
+    words,
+)
 from sbas.logs.time_stamps import (
     Stamps,
     parse_stamps,
@@ -31,8 +41,10 @@ from sbas.logs.time_stamps import (
     stamps_to_gps,
     week_stamps,
 )
-from sbas.recording import COLUMNS, Recording, RecordingMeta, with_columns
+from sbas.recording import Recording, RecordingMeta, with_columns
 from sbas.timescales import TimeScale
+
+_WORDS = ("mode", "environment", "hardware_fault")
 
 
 def read_foreign(
@@ -68,7 +80,7 @@ def read_foreign(
         time_scale=mapped.time_scale,
         leap_seconds=mapped.leap_seconds,
         geoid=mapped.geoid,
-        findings=(unstated, *mapped.findings),
+        findings=(unstated, *mapped.findings, *no_level_finding(mapped.sources)),
         options=mapped.options,
     )
     if progress is not None:
@@ -89,7 +101,15 @@ def map_foreign(
 ) -> MappedTable:
     """Documented columns of an open Parquet file; arguments as of `delimited_text.read_mapped`."""
     where = str(path)
-    names = list(file.schema_arrow.names)
+    schema = file.schema_arrow
+    names = list(schema.names)
+    if len(set(names)) < len(names):
+        raise InputError(
+            "two columns have the same name",
+            where=where,
+            evidence=", ".join(sorted({n for n in names if names.count(n) > 1})[:8]),
+            cure="rename or drop one of them",
+        )
     headers = ["time" if n == "__index_level_0__" else n for n in names]
     mapped, others = map_headers(headers, where=where, extra=extra)
     by_week = "time" not in mapped
@@ -103,9 +123,15 @@ def map_foreign(
             evidence=f"columns {', '.join(headers)[:300]}",
             cure="name the time column 'time', or give 'week' and 'tow'",
         )
-    wanted = needed_columns(columns, mapped, others)
     every = {**mapped, **others}
-    table = file.read(columns=[names[every[name].index] for name in (*time_names, *wanted)])
+    kinds = {name: schema.field(column.index).type for name, column in every.items()}
+    wanted = needed_columns(columns, mapped, others)
+    unusable = [name for name in wanted if name.startswith("x_") and not _usable(kinds[name])]
+    wanted = tuple(name for name in wanted if name not in unusable)
+    _check_kinds({name: kinds[name] for name in wanted}, every, where)
+    table = read_columns(
+        path, [names[every[name].index] for name in (*time_names, *wanted)], where=where
+    )
     arrays = {name: table.column(names[every[name].index]) for name in (*time_names, *wanted)}
     stamps, said = (
         (
@@ -113,7 +139,7 @@ def map_foreign(
             "GPST",
         )
         if by_week
-        else (_stamps(arrays["time"], where), mapped["time"].scale)
+        else (_stamps(arrays["time"], mapped["time"].header, where), mapped["time"].scale)
     )
     good = stamps.readable
     bad = int(np.count_nonzero(~good))
@@ -142,38 +168,35 @@ def map_foreign(
                 cure="take them out, or complete their times",
             ),
         )
+    if unusable:
+        findings += (
+            Finding(
+                "E25",
+                "info",
+                "columns that are neither numbers nor text were left out",
+                evidence=", ".join(f"{every[n].header} ({kinds[n]})" for n in unusable)[:300],
+            ),
+        )
     mask = pa.array(good)
     values, texts, narrow = {}, {}, []
     for name in wanted:
         column = arrays[name].filter(mask)
-        kind = column.type.value_type if pa.types.is_dictionary(column.type) else column.type
-        if pa.types.is_float32(kind):
+        kind = value_type(column.type)
+        if pa.types.is_float32(kind) or pa.types.is_float16(kind):
             narrow.append(name)
-        if _is_text(kind) or name == "mode":
-            texts[name] = _one(column.cast(pa.string()))
-        elif _is_number(kind):
+        if name in _WORDS or is_text(kind):
+            texts[name] = words(column, header=every[name].header, where=where)
+        elif pa.types.is_null(kind):
+            values[name] = np.full(len(column), np.nan)
+        else:
             values[name] = _numbers(column)
-        elif name in COLUMNS:
-            raise InputError(
-                f"column {every[name].header!r} is neither number nor text",
-                where=where,
-                evidence=str(kind),
-                cure="write it as numbers, or rename it to 'x_...'",
-            )
-    wrong_text = [n for n in texts if COLUMNS.get(n) is not None and COLUMNS[n].dtype == "f8"]
-    if wrong_text or "altitude" in texts:
-        raise InputError(
-            "columns that should be numbers are text",
-            where=where,
-            evidence=", ".join(wrong_text or ["altitude"]),
-            cure="write them as numbers",
-        )
     if narrow:
         findings += (
             Finding(
                 "E25",
                 "warning",
-                "numbers stored as float32 were widened; degrees in float32 lie up to 0.4 m apart",
+                "numbers stored as float32 or float16 were widened; degrees in float32 lie up to "
+                "0.4 m apart",
                 evidence=f"{len(good):,} rows of {', '.join(narrow)}",
                 cure="write positions as float64",
             ),
@@ -192,43 +215,56 @@ def map_foreign(
     if mode_map is not None:
         options["mode_map"] = ", ".join(f"{word}={name}" for word, name in mode_map.items())
     found = (*findings, *conversions, *more)
-    return MappedTable(frame, found, scale, leap_seconds, options, applied_geoid(geoid, wanted))
-
-
-def _is_text(kind: Any) -> bool:
-    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
-
-
-def _is_number(kind: Any) -> bool:
-    return bool(
-        pa.types.is_integer(kind)
-        or pa.types.is_floating(kind)
-        or pa.types.is_boolean(kind)
-        or pa.types.is_decimal(kind)
+    return MappedTable(
+        frame,
+        found,
+        scale,
+        leap_seconds,
+        options,
+        applied_geoid(geoid, wanted),
+        header_sources(mapped, others),
     )
 
 
-def _one(column: Any) -> Any:
-    array = column.combine_chunks()
-    if isinstance(array, pa.ChunkedArray):
-        array = pa.concat_arrays(array.chunks) if array.num_chunks else pa.array([], array.type)
-    return array
+def _usable(kind: Any) -> bool:
+    plain = value_type(kind)
+    return is_text(kind) or is_number(kind) or pa.types.is_boolean(plain) or pa.types.is_null(plain)
+
+
+def _check_kinds(kinds: Mapping[str, Any], every: Mapping[str, MappedColumn], where: str) -> None:
+    """Refuse documented columns of a type that cannot be what they are named."""
+    for name, kind in kinds.items():
+        plain = value_type(kind)
+        if name.startswith("x_") or is_number(plain) or pa.types.is_null(plain):
+            continue
+        if pa.types.is_boolean(plain):
+            fits, instead = name == "hardware_fault", "truth values"
+        else:
+            fits, instead = is_text(plain) and name in _WORDS, "text" if is_text(plain) else "no"
+        if not fits:
+            raise InputError(
+                f"column {every[name].header!r} holds {instead}"
+                + (" where numbers should be" if instead != "no" else " numbers"),
+                where=where,
+                evidence=str(kind),
+                cure="write it as numbers, or rename it to 'x_...'",
+            )
 
 
 def _numbers(column: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    kind = column.type
-    if pa.types.is_boolean(kind):
-        column = column.cast(pa.int8())
+    kind = value_type(column.type)
+    column = column.cast(pa.int8() if pa.types.is_boolean(kind) else kind)
     values: np.ndarray[Any, np.dtype[np.float64]] = (
-        _one(column).cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
+        one_array(column).cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
     )
     return values
 
 
-def _stamps(column: Any, where: str) -> Stamps:
-    kind = column.type
-    if _is_text(kind):
-        return parse_stamps(_one(column))
+def _stamps(column: Any, header: str, where: str) -> Stamps:
+    kind = value_type(column.type)
+    if is_text(kind):
+        return parse_stamps(words(column, header=header, where=where))
+    column = column.cast(kind)
     if not pa.types.is_timestamp(kind):
         raise InputError(
             "the time column holds numbers whose origin and unit are not said",
@@ -238,7 +274,7 @@ def _stamps(column: Any, where: str) -> Stamps:
         )
     known = column.is_valid().to_numpy().astype(bool)
     try:
-        ns = _one(pc.fill_null(column, pa.scalar(0, kind))).cast(pa.timestamp("ns", kind.tz))
+        ns = one_array(pc.fill_null(column, pa.scalar(0, kind))).cast(pa.timestamp("ns", kind.tz))
     except pa.ArrowInvalid as error:
         raise InputError(
             "times lie outside 1678 to 2261",

@@ -215,7 +215,7 @@ def detect(path: str | os.PathLike[str]) -> Detection:
             where=str(path),
             evidence=_first_sight(head)
             + "; likeliest: "
-            + ", ".join(f"{c.name} {s} ({m.reason})" for s, c, m in scored[:3]),
+            + ", ".join(f"{c.name} {s} ({m.reason})" for s, c, m in scored),
             cure=f"name it: --format with one of {', '.join(f.name for f in formats())}",
         )
     if len(scored) > 1 and best_score - scored[1][0] < CLOSE_SCORES:
@@ -270,8 +270,11 @@ def _checked_file(path: str | os.PathLike[str]) -> Path:
                 near := difflib.get_close_matches(file.name, os.listdir(file.parent), n=1)
             ):
                 cure += f"; there is {near[0]!r}"
-        elif not file.is_file():
+        elif file.is_dir():
             problem, cure = "this is a folder, not a file", "name a file in it"
+        elif not file.is_file():
+            problem = "this is no regular file but a pipe or a device"
+            cure = "write what it delivers to a file, and give that"
         elif not file.stat().st_size:
             problem, cure, code = "the file is empty", "check that the recording was written", "E15"
         else:

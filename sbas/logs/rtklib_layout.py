@@ -2,11 +2,28 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from sbas.exceptions import InputError
+
+_METRES = (
+    "height", "x-ecef", "y-ecef", "z-ecef", "hpl", "vpl",
+    "sdn", "sde", "sdu", "sdne", "sdeu", "sdun",
+    "sdx", "sdy", "sdz", "sdxy", "sdyz", "sdzx",
+)  # fmt: skip
+_SPEEDS = ("vn", "ve", "vu", "vx", "vy", "vz")
+_SPEED_SIGMAS = ("sdvn", "sdve", "sdvu", "sdvne", "sdveu", "sdvun",
+                 "sdvx", "sdvy", "sdvz", "sdvxy", "sdvyz", "sdvzx")  # fmt: skip
+_ANGLES = ("latitude(deg)", "longitude(deg)", "latitude(d'\")", "longitude(d'\")")
+KNOWN = frozenset((
+    *_ANGLES, "Q", "ns", "age(s)", "ratio", *(f"{name}(m)" for name in _METRES),
+    *(f"{name}(m/s)" for name in _SPEEDS), *_SPEED_SIGMAS,
+    *(f"{name}(m/s)" for name in _SPEED_SIGMAS),
+))  # fmt: skip
+"""Every column that RTKLIB and rtklib_ws write, with its unit. Source: outhead in solution.c."""
 
 COLUMN_HEADER = re.compile(
     r"^%\s+(GPST|UTC|JST)\s*([,;\t|]?)\s*"
@@ -52,7 +69,8 @@ def parse_header(text: str, *, where: str) -> Layout:
 
     Raises
     ------
-    InputError : no line that names the columns, or a baseline instead of positions.
+    InputError : no line that names the columns, a baseline instead of positions, a name or unit
+        that is not known, or no position or mode.
     """
     found = COLUMN_HEADER.search(text)
     if found is None:
@@ -71,6 +89,15 @@ def parse_header(text: str, *, where: str) -> Layout:
             cure="write positions instead (RTKLIB option out-solformat=llh)",
         )
     listed = columns.replace(separator or " ", " ").replace(" (m)", "(m)").split()
+    if unknown := [name for name in listed if name not in KNOWN]:
+        near = difflib.get_close_matches(unknown[0], KNOWN, n=1)
+        raise InputError(
+            f"the header of the .pos file names unknown columns: {', '.join(unknown)}",
+            where=where,
+            evidence=found[0].strip(),
+            cure=(f"did you mean {near[0]!r}? " if near else "")
+            + f"Known are {', '.join(sorted(KNOWN))}",
+        )
     names: list[str] = []
     for name in listed:
         if name in ("latitude(d'\")", "longitude(d'\")"):
@@ -85,6 +112,15 @@ def parse_header(text: str, *, where: str) -> Layout:
     if len(set(names)) < len(names):
         raise InputError(
             "two columns of the .pos file have one name", where=where, evidence=columns
+        )
+    position = ("x-ecef", "y-ecef", "z-ecef") if "x-ecef" in names else ("lon", "height")
+    lacking = [n for n in (*position, "Q") if not any(name.startswith(n) for name in names)]
+    if lacking:
+        raise InputError(
+            f"the header of the .pos file lacks {', '.join(lacking)}",
+            where=where,
+            evidence=found[0].strip(),
+            cure="write the solution again with all its columns",
         )
     return Layout(scale, separator or " ", tuple(names), datum, height, header_text(found))
 

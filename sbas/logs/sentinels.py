@@ -1,4 +1,5 @@
-"""Values that stand for "missing" in files that do not say so, found and counted."""
+"""Values that stand for something else in files that do not say so, found and counted: "missing",
+and longitudes that run to 360 degrees."""
 
 from __future__ import annotations
 
@@ -77,3 +78,20 @@ def sentinel_findings(counts: Mapping[str, Mapping[str, int]]) -> tuple[Finding,
             evidence="; ".join(shown),
         ),
     )
+
+
+def wrapped_longitudes(
+    lon_deg: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], tuple[Finding, ...]]:
+    """(n,) longitudes of the convention 0..360 as -180..180, counted; any others as they are."""
+    known = lon_deg[np.isfinite(lon_deg)]
+    beyond = lon_deg > 180
+    if not beyond.any() or known.min() < 0 or known.max() > 360:
+        return lon_deg, ()
+    finding = Finding(
+        "E26",
+        "info",
+        "longitudes of 0 to 360 degrees were written as -180 to 180",
+        evidence=f"{np.count_nonzero(beyond):,} of {len(lon_deg):,} above 180",
+    )
+    return np.where(beyond, lon_deg - 360, lon_deg), (finding,)

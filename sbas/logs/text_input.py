@@ -32,6 +32,7 @@ BAD_SHARE = 0.01
 
 _MISSING_WORDS = ("nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-")
 _NUMBER = r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$"
+_OTHER_NUMBER = r"^[+-]?[0-9]*([.,][0-9]{3})*[.,][0-9]+([eE][+-]?[0-9]+)?$"
 _BOMS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"),
          (codecs.BOM_UTF16_BE, "utf-16-be"))  # fmt: skip
 
@@ -109,22 +110,33 @@ class TextBlocks:
                 if old_mac:
                     raw = raw.replace(b"\r", b"\n")
                 text = carry + raw
+                self._refuse_long_lines(text, skip + done - len(text))
                 cut = text.rfind(b"\n") + 1
                 carry = text[cut:]
-                if len(carry) > MAX_LINE_BYTES and carry.strip(b"\0"):
-                    raise InputError(
-                        f"no line end within {MAX_LINE_BYTES:,} bytes",
-                        code="E18",
-                        where=f"{self.path}, near byte {skip + done - len(carry):,}",
-                        evidence=f"{carry[:40]!r}",
-                        cure="this is no text file of records, or its line ends are lost; "
-                        "name the right format with --format",
-                    )
                 if cut:
                     yield self._clean(text[:cut], offset + skip)
                 if self._progress is not None:
                     self._progress(min(done + skip, total), total)
         self.unfinished = self._clean(carry, done) if carry.strip() else b""
+
+    def _refuse_long_lines(self, text: bytes, offset: int) -> None:
+        """E18 for a line above MAX_LINE_BYTES, of NULs (a hole that a crash left) apart."""
+        start = 0
+        while len(text) - start > MAX_LINE_BYTES:
+            # The last line end within reach: a jump of many lines at once.
+            if (end := text.rfind(b"\n", start, start + MAX_LINE_BYTES + 1)) < 0:
+                end = text.find(b"\n", start)
+                end = len(text) if end < 0 else end
+                if text[start:end].strip(b"\0"):
+                    raise InputError(
+                        f"no line end within {MAX_LINE_BYTES:,} bytes",
+                        code="E18",
+                        where=f"{self.path}, near byte {offset + start:,}",
+                        evidence=f"{text[start : start + 40]!r}",
+                        cure="this is no text file of records, or its line ends are lost; "
+                        "name the right format with --format",
+                    )
+            start = end + 1
 
     def _clean(self, text: bytes, offset: int) -> bytes:
         if (at := text.find(0)) >= 0:
@@ -189,6 +201,7 @@ class Fields:
     unreadable : (rows,) bool by name of a number column: there was text, but no number.
     words : words for "missing" (such as NaN) met, by name.
     bad_lines : lines with another number of fields, and the first of them.
+    other_decimal : the first number with the other decimal sign than `decimal`, "" for none.
     """
 
     rows: int
@@ -198,6 +211,7 @@ class Fields:
     words: dict[str, int] = field(default_factory=dict)
     bad_lines: int = 0
     first_bad: str = ""
+    other_decimal: str = ""
 
 
 def parse_lines(
@@ -273,6 +287,7 @@ def parse_lines(
     text_columns: dict[str, Any] = {}
     unreadable: dict[str, NDArray[np.bool_]] = {}
     words: dict[str, int] = {}
+    other_decimal = ""
     for name in wanted:
         column = table.column(name).combine_chunks()
         if isinstance(column, pa.ChunkedArray):
@@ -286,6 +301,7 @@ def parse_lines(
             values, wrong, missing_words = parse_numbers(column, decimal)
             if wrong.any():
                 unreadable[name] = wrong
+                other_decimal = other_decimal or _other_decimal(column.filter(pa.array(wrong)))
         else:
             values = column.to_numpy(zero_copy_only=False)
             missing_words = int(np.count_nonzero(np.isnan(values))) - column.null_count
@@ -293,8 +309,24 @@ def parse_lines(
             words[name] = missing_words
         numbers[name] = values
     return Fields(
-        table.num_rows, numbers, text_columns, unreadable, words, len(bad), bad[0] if bad else ""
+        table.num_rows,
+        numbers,
+        text_columns,
+        unreadable,
+        words,
+        len(bad),
+        bad[0] if bad else "",
+        other_decimal,
     )
+
+
+def _other_decimal(unreadable: Any) -> str:
+    """The first of some fields that are no numbers which would be one with the other sign."""
+    meant = pc.match_substring_regex(
+        pc.utf8_trim_whitespace(unreadable.cast(pa.string())), _OTHER_NUMBER
+    )
+    found = unreadable.filter(meant)
+    return str(found[0]) if len(found) else ""
 
 
 def parse_numbers(
@@ -302,9 +334,12 @@ def parse_numbers(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
     """Numbers of a text column: (n,) values, (n,) where text is no number, count of NaN words."""
     text = pc.utf8_trim_whitespace(column.cast(pa.string()))
-    if decimal != ".":
-        text = pc.replace_substring(text, decimal, ".")
     good = pc.match_substring_regex(text, _NUMBER)
+    if decimal != ".":
+        # A point in such a text is no decimal point (1.250 may be 1250): no number.
+        pointed = pc.match_substring(text, ".")
+        text = pc.replace_substring(text, decimal, ".")
+        good = pc.and_(pc.match_substring_regex(text, _NUMBER), pc.invert(pointed))
     cleaned = pc.replace_substring_regex(pc.if_else(good, text, None), r"^\+", "")
     values = cleaned.cast(pa.float64()).to_numpy(zero_copy_only=False)
     empty = pc.fill_null(pc.equal(text, ""), True)

@@ -14,7 +14,8 @@ import pyarrow.parquet as pq
 
 from sbas.exceptions import InputError
 from sbas.logs import delimited_text
-from sbas.logs.column_map import TRUTH_COLUMNS, MappedTable
+from sbas.logs.column_map import MappedTable, geoid_unused
+from sbas.logs.column_names import TRUTH_COLUMNS
 from sbas.logs.parquet import opened, read
 from sbas.logs.parquet_foreign import map_foreign
 from sbas.logs.parquet_writer import META_KEY
@@ -35,8 +36,9 @@ def read_truth_table(
     ----------
     path : CSV or Parquet with time, latitude, longitude and height, in any spelling that the
         alias map of delimited text knows; optional `sigma_h_m`, `sigma_v_m`, `heading_deg`.
-    time_scale : scale of the times; needed for Parquet without metadata of sbas.
-    geoid : undulation [m] where the heights are above the geoid.
+    time_scale : scale of the times where the file does not say it; needed for Parquet without
+        metadata of sbas.
+    geoid : undulation [m], added where the file says that its heights are above the geoid.
 
     Returns
     -------
@@ -50,21 +52,26 @@ def read_truth_table(
     file = Path(path)
     if not file.is_file():
         raise InputError(
-            "there is no such truth file", where=str(path), cure="check the name and the folder"
+            "the truth is no regular file" if file.exists() else "there is no such truth file",
+            where=str(path),
+            cure="check the name and the folder",
         )
     with open(file, "rb") as stream:
         is_parquet = stream.read(4) == b"PAR1"
     columns = (*POSITION, *TRUTH_COLUMNS)
     if not is_parquet:
-        mapped = delimited_text.read_mapped(
-            file, columns=columns, extra=TRUTH_COLUMNS, time_scale=time_scale, geoid=geoid
-        )
+        mapped = delimited_text.read_mapped(file, columns=columns, extra=TRUTH_COLUMNS, geoid=geoid)
+        if time_scale not in (None, mapped.time_scale) and "time_scale" in mapped.options:
+            # Neither header nor times named a scale.
+            mapped = delimited_text.read_mapped(
+                file, columns=columns, extra=TRUTH_COLUMNS, time_scale=time_scale, geoid=geoid
+            )
         return _checked(mapped, str(path))
     with opened(file) as parquet:
         if META_KEY not in (parquet.schema_arrow.metadata or {}):
             mapped = _foreign(parquet, file, columns, time_scale, geoid)
             return _checked(mapped, str(path))
-    recording = read(file, columns=POSITION, time_scale=time_scale, geoid=geoid)
+    recording = read(file, columns=POSITION)  # its metadata say scale and kind of height
     errors = tuple(f for f in recording.meta.findings if f.severity == "error")
     return _checked(MappedTable(recording.table, errors, "GPST", None, {}), str(path))
 
@@ -96,7 +103,13 @@ def _checked(mapped: MappedTable, where: str) -> pd.DataFrame:
             evidence=mapped.options.get("columns", ", ".join(mapped.table.columns)),
             cure="name the columns time, lat_deg, lon_deg, height_m",
         )
-    odd = [finding for finding in mapped.findings if finding.severity != "info"]
+    # Decimal commas are read without doubt or refused; an undulation that no height needs is
+    # there for the recording.
+    odd = [
+        finding
+        for finding in mapped.findings
+        if finding.severity != "info" and finding.code != "E20" and finding != geoid_unused()
+    ]
     if odd:
         raise InputError(
             f"the truth is not clean: {odd[0].message}",

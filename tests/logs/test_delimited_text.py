@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import time
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +27,12 @@ def read(folder: Path, text: str | bytes, **options: object) -> Recording:
 
 
 def codes(recording: Recording) -> list[tuple[str, str]]:
-    return [(f.code, f.severity) for f in recording.meta.findings]
+    """Codes and severities, but of the missing level, which most tables here are without."""
+    return [
+        (f.code, f.severity)
+        for f in recording.meta.findings
+        if not f.message.startswith("no column was taken for HPL")
+    ]
 
 
 def one(folder: Path, header: str, value: str, **options: object) -> pd.Series:
@@ -354,3 +361,167 @@ def test_any_bytes_give_a_recording_or_an_input_error(
     except InputError:
         return
     assert len(recording) > 0
+
+
+HEADER = "time,lat,lon,hpl,vpl\n"
+FIRST = f"{T}1,50.5,15.5,11.5,20.5\n{T}2,50.5,15.5,11.5,20.5\n"
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        "time,lat,lon,vpl,hpl\n",
+        "utc,lat,lon,hpl,vpl\n",
+        "time,lat,lon,hpl [km],vpl\n",
+        "time,lat,lon,hpl\n",
+        "time;lat;lon;hpl;vpl\n",
+        "# time,lat,lon,vpl,hpl\n",
+        '"time","lat","lon","vpl","hpl"\n',
+        "\ufefftime,lat,lon,vpl,hpl\n",
+    ],
+)
+@pytest.mark.parametrize("columns", [None, ["hpl_m"]])
+def test_joined_files_of_two_layouts_are_refused(
+    tmp_path: Path, later: str, columns: list[str] | None
+) -> None:
+    with pytest.raises(InputError, match="two layouts") as caught:
+        read(tmp_path, HEADER + FIRST + later + f"{T}3,50.5,15.5,33.5,44.5\n", columns=columns)
+    assert caught.value.code == "E06"
+
+
+@pytest.mark.parametrize("header", [HEADER, "week,tow,lat,hpl\n", "# " + HEADER])
+def test_the_header_once_more_is_left_out_and_counted(tmp_path: Path, header: str) -> None:
+    rows = FIRST if "week" not in header else "1549,1.5,50.5,11.5\n1549,2.5,50.5,11.5\n"
+    last = rows.replace(f"{T}1", f"{T}3").replace(f"{T}2", f"{T}4")
+    recording = read(tmp_path, header + rows + header + last)
+    assert recording.table["hpl_m"].tolist() == [11.5] * 4
+    assert codes(recording) == [("E26", "info")]
+    assert recording.meta.findings[0].evidence == "1 times"
+
+
+def test_a_text_column_that_speaks_of_time_is_no_header(tmp_path: Path) -> None:
+    rows = f"{T}1,50.5,time out\n{T}2,50.5,UTC\n{T}x,50.5,time\n"
+    recording = read(tmp_path, "time,lat,comment\n" + rows)
+    assert len(recording) == 2
+    assert codes(recording) == [("E10", "error")]
+
+
+@pytest.mark.parametrize(
+    ("header", "units", "hpl", "first"),
+    [
+        (HEADER, "-,deg,deg,km,m", 11500.0, "2025-05-23T14:09:11"),
+        (HEADER, "# -,deg,deg,km,m", 11500.0, "2025-05-23T14:09:11"),
+        (HEADER, "[UTC],[deg],[deg],[mm],[m]", 0.0115, "2025-05-23T14:09:29"),
+        (HEADER, "yyyy-mm-dd hh:mm:ss,deg,deg,cm,-", 0.115, "2025-05-23T14:09:11"),
+        (HEADER.replace("hpl", "hpl_km"), ",,,km,m", 11500.0, "2025-05-23T14:09:11"),
+        (HEADER.replace("hpl", "hpl [km]"), ",,,,m", 11500.0, "2025-05-23T14:09:11"),
+    ],
+)
+def test_a_line_of_units_below_the_header_is_used(
+    tmp_path: Path, header: str, units: str, hpl: float, first: str
+) -> None:
+    recording = read(tmp_path, header + units + "\n" + FIRST)
+    assert recording.table["hpl_m"].tolist() == pytest.approx([hpl] * 2, rel=1e-15)
+    assert str(recording.time[0])[:19] == first
+    assert ("E26", "info") in codes(recording)
+    both = read(tmp_path, header + units + "\n" + FIRST + header + units + "\n" + FIRST)
+    assert both.table["hpl_m"].tolist() == pytest.approx([hpl] * 4, rel=1e-15)
+
+
+@pytest.mark.parametrize("units", ["-,deg,deg,ft,m", "-,m,deg,m,m", "x,Breite,Laenge,HPL,VPL"])
+def test_a_line_of_other_units_is_refused(tmp_path: Path, units: str) -> None:
+    with pytest.raises(InputError, match="unit") as caught:
+        read(tmp_path, HEADER + units + "\n" + FIRST)
+    assert "line 2" in caught.value.where
+    with pytest.raises(InputError, match="two units"):
+        read(tmp_path, HEADER.replace("hpl", "hpl [m]") + "-,deg,deg,km,m\n" + FIRST)
+
+
+def test_a_second_line_of_other_units_is_refused(tmp_path: Path) -> None:
+    first, second = "-,deg,deg,m,m\n", "-,deg,deg,km,m\n"
+    with pytest.raises(InputError, match="two layouts"):
+        read(tmp_path, HEADER + first + FIRST + HEADER + second + FIRST)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1," * 32_000,
+        "1," * 32_000 + "\n" + "1," * 32_000,
+        "time,lat" + ",a" * 4000 + "\n",
+        "time,lat" + "".join(f",c{i}" for i in range(300_000)) + "\n",
+        "time,lat," + "a" * 3_000_000 + "\n" + f"{T}6,50.5,1\n",
+        "time,lat," + "(" * 60_000 + "\n" + f"{T}6,50.5,1\n",
+        "time,lat,lon\n" + f"{T}6,50.5,15.5\n" + "1," * 1_000_000 + f"\n{T}7,50.5,15.5\n",
+    ],
+)
+def test_wide_tables_and_long_lines_end_at_once(tmp_path: Path, text: str) -> None:
+    started = time.perf_counter()
+    data = text.encode()
+    delimited_text.sniff(data[: 1 << 16], data[: 1 << 16], data[-4096:], tmp_path)
+    with contextlib.suppress(InputError):
+        read(tmp_path, data)
+        assert "((" in text  # a strange name alone is no reason to refuse
+    assert time.perf_counter() - started < 3
+
+
+def test_equal_names_are_kept_apart(tmp_path: Path) -> None:
+    header = "time,lat,a,a,x_a,3,\n"
+    table = read(tmp_path, header + f"{T}6,50.5,1,2,3,4,5\n").table
+    assert table.iloc[0].tolist() == [50.5, 1, 2, 3, 4, 5]
+    assert list(table)[1:4] == ["x_a", "x_a_", "x_a__"]
+
+
+@pytest.mark.parametrize("late", ["11.5", "1.250", "1.250,5", "-.5"])
+def test_a_point_far_down_among_decimal_commas_is_refused(tmp_path: Path, late: str) -> None:
+    row = "2025-05-23 00:{:02d}:{:02d};50,5;{}\n"
+    rows = "".join(row.format(k // 60, k % 60, "11,5") for k in range(300))
+    with pytest.raises(InputError, match="decimal comma and decimal point") as caught:
+        read(tmp_path, "time;lat;hpl\n" + rows + row.format(30, 0, late))
+    assert caught.value.code == "E20"
+    assert late in caught.value.evidence
+    whole = "".join(row.format(k // 60, k % 60, "11") for k in range(60)).replace("50,5", "50")
+    with pytest.raises(InputError, match="E20"):
+        read(tmp_path, "time;lat;hpl\n" + whole + row.format(30, 0, "11,5"))
+
+
+@pytest.mark.parametrize("value", ["-1", "4294967296", "1.5", "inf"])
+def test_flags_that_are_no_bits_are_refused(tmp_path: Path, value: str) -> None:
+    with pytest.raises(InputError, match="flags"):
+        read(tmp_path, f"time,hpl,flags\n{T}6,11.5,8\n{T}7,11.5,{value}\n")
+    table = read(tmp_path, f"time,hpl,flags\n{T}6,11.5,8\n{T}7,11.5,\n").table
+    assert table["flags"].tolist() == [8, 0]
+
+
+def test_a_table_without_levels_says_so(tmp_path: Path) -> None:
+    text = f"time,lat,HPL 95%,Protection level\n{T}6,50.5,11.5,12.5\n"
+    (finding,) = read(tmp_path, text).meta.findings
+    assert (finding.code, finding.severity) == ("E25", "warning")
+    assert finding.message.startswith("no column was taken for HPL")
+    assert "'HPL 95%', 'Protection level'" in finding.evidence
+    assert read(tmp_path, text.replace("HPL 95%", "HPL"), columns=["lat_deg"]).meta.findings == ()
+
+
+def test_longitudes_of_0_to_360_are_wrapped_and_counted(tmp_path: Path) -> None:
+    recording = read(tmp_path, f"time,lon\n{T}6,350.5\n{T}7,180\n{T}8,0\n")
+    assert recording.table["lon_deg"].tolist() == [-9.5, 180.0, 0.0]
+    assert codes(recording) == [("E26", "info")]
+    assert recording.meta.findings[0].evidence.startswith("1 of 3")
+    for rows in ("350.5\n{T}7,-9.5", "361\n{T}7,350"):  # no such convention: left for E08
+        untouched = read(tmp_path, f"time,lon\n{T}6,{rows.format(T=T)}\n")
+        assert codes(untouched) == []
+
+
+def test_no_data_is_e15(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="a header and no data") as caught:
+        read(tmp_path, "time,lat\n")
+    assert caught.value.code == "E15"
+    assert not caught.value.what.startswith("E15")
+
+
+def test_units_in_a_later_file_alone_are_refused(tmp_path: Path) -> None:
+    for units in ("-,deg,deg,km,m\n", "# -,deg,deg,km,m\n"):
+        with pytest.raises(InputError, match="two layouts"):
+            read(tmp_path, HEADER + FIRST + HEADER + units + FIRST)
+        with pytest.raises(InputError, match="two layouts"):
+            read(tmp_path, HEADER + units + FIRST + HEADER + FIRST)

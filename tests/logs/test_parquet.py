@@ -89,6 +89,7 @@ VALUES = {
     "u4": st.integers(0, 2**32 - 1),
     "bool": st.booleans(),
 }
+LEVELS = st.floats(-65534, 65534) | st.just(float("nan"))  # beyond, levels are made missing
 
 
 @st.composite
@@ -106,7 +107,8 @@ def recordings(draw: st.DrawFn) -> Recording:
             drawn = draw(st.lists(codes, min_size=rows, max_size=rows))
             columns[name] = pd.Categorical.from_codes(drawn, pd.Index(names, dtype="str"))
         else:
-            drawn = draw(st.lists(VALUES[dtype], min_size=rows, max_size=rows))
+            values = LEVELS if name in ("hpl_m", "vpl_m") else VALUES[dtype]
+            drawn = draw(st.lists(values, min_size=rows, max_size=rows))
             columns[name] = np.array(drawn, dtype)
     times = draw(st.lists(st.integers(0, 2**62), min_size=rows, max_size=rows))
     index = pd.DatetimeIndex(np.array(times, "i8").astype("M8[ns]"), name="time")
@@ -170,7 +172,9 @@ def test_pieces_become_one_recording(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 def test_pieces_with_new_environment_labels(tmp_path: Path) -> None:
     def piece(second: int, label: str) -> Recording:
-        index = pd.DatetimeIndex([np.datetime64("2025-05-23", "ns") + second], name="time")
+        index = pd.DatetimeIndex(
+            [np.datetime64("2025-05-23", "ns") + np.timedelta64(second, "ns")], name="time"
+        )
         return Recording(pd.DataFrame({"environment": pd.Categorical([label])}, index=index))
 
     path = written(tmp_path, piece(0, "open"), piece(1, "tunnel"))

@@ -6,6 +6,7 @@ import gzip
 import hashlib
 import importlib.metadata
 import inspect
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -308,3 +309,22 @@ def test_sniffers_never_raise(
         assert 0 <= match.score <= 100
         assert match.reason
     read_or_refusal(path, None)
+
+
+def test_pipes_and_devices_are_no_files(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/zero")):
+        with pytest.raises(InputError, match="no regular file"):
+            registry.read(path)
+    with pytest.raises(InputError, match="a folder"):
+        registry.read(tmp_path)
+
+
+def test_a_refusal_tells_what_each_format_found(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="not recognised") as caught:
+        registry.detect(put(tmp_path, b"word\n" * 9))
+    for name in ("septentrio_sbf", "rtklib_pos", "parquet", "csv"):
+        assert f"{name} " in caught.value.evidence
+    with pytest.raises(InputError, match="columns") as caught:
+        registry.read(put(tmp_path, b"1," * 32_000 + b"\n"))
+    assert caught.value.code == "E18"

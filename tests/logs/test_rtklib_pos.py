@@ -344,3 +344,69 @@ def test_any_bytes_give_a_recording_or_an_input_error(
         return
     assert len(recording) > 0
     assert not (recording.table["hpl_m"] == 0).any()
+
+
+@pytest.mark.parametrize(
+    ("levels", "missing", "shown"),
+    [
+        ("65535 45.5", (True, False), "hpl_m: 1 x 65535"),
+        ("655.35 655.35", (True, True), "vpl_m: 1 x 655.35"),
+        ("4294967295 45.5", (True, False), "hpl_m: 1 x 4294967295"),
+        ("-2e10 -2e10", (True, True), "hpl_m: 1 x -2e10"),
+        ("inf 45.5", (True, False), "hpl_m: 1 x infinite"),
+        ("8000 100", (True, True), "8000 (beside VPL 100)"),
+    ],
+)
+def test_sentinel_levels_are_missing_flagged_and_counted(
+    tmp_path: Path, levels: str, missing: tuple[bool, bool], shown: str
+) -> None:
+    rows = ROW + "  27.30   45.5\n" + ROW.replace(":13.", ":14.") + f"  {levels}\n"
+    recording = read(tmp_path, FRAME + LEVELS + rows)
+    table = recording.table
+    assert tuple(table[["hpl_m", "vpl_m"]].iloc[1].isna()) == missing
+    assert table["hpl_m"].iloc[0] == 27.30
+    assert table["flags"].tolist() == [0, Flag.PL_SENTINEL]
+    assert codes(recording) == [("E07", "warning")]
+    assert shown in recording.meta.findings[0].evidence
+
+
+def test_sentinel_positions_are_missing_flagged_and_counted(tmp_path: Path) -> None:
+    zero = ROW.replace("47.530299305", "0.0").replace("21.628699868", "0.0")
+    recording = read(tmp_path, FRAME + LEVELS + zero + "  27.30   45.5\n")
+    assert recording.table[["lat_deg", "lon_deg"]].isna().all(axis=None)
+    assert recording.table["flags"].tolist() == [Flag.POSITION_SENTINEL]
+    assert "lat_deg: 1 x (0, 0)" in recording.meta.findings[0].evidence
+    row = "2016/07/12 12:02:13.000  0.0  0.0  0.0   3   4" + "  1.0" * 6 + "  2.50  1.3\n"
+    recording = read(tmp_path, PLAIN.replace(LLH, ECEF) + row)
+    assert recording.table[["lat_deg", "lon_deg", "height_m"]].isna().all(axis=None)
+    assert recording.table["flags"].tolist() == [Flag.POSITION_SENTINEL]
+    assert codes(recording)[-1] == ("E07", "warning")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "shown"),
+    [
+        ("height(m)", "heigth(m)", "heigth(m)"),
+        ("sdu(m)", "sdV(m)", "sdV(m)"),
+        ("longitude(deg)", "longitde(deg)", "longitde(deg)"),
+        ("   Q  ", "   q  ", "unknown columns: q"),
+        ("hpl (m)", "hpl (km)", "(km)"),
+        ("   Q  ", "  ", "lacks Q"),
+        ("  height(m)", "", "lacks height"),
+    ],
+)
+def test_a_header_with_unknown_or_lacking_names_is_refused(
+    tmp_path: Path, old: str, new: str, shown: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, FRAME + LEVELS.replace(old, new) + ROW + "  27.30   45.5\n")
+    assert shown in caught.value.what
+    assert caught.value.cure
+
+
+def test_velocities_and_sigmas_that_lack_one_are_read(tmp_path: Path) -> None:
+    header = LEVELS.replace("sdu(m)", "").replace("\n", " vn(m/s) ve(m/s) vu(m/s) sdvn\n")
+    row = ROW.replace("8.5337", "") + " 27.30 45.5 1.0 2.0 3.0 0.1\n"
+    recording = read(tmp_path, FRAME + header + row)
+    assert recording.table["vel_e_mps"].tolist() == [2.0]
+    assert "sigma_u_m" not in recording.table

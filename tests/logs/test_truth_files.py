@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -76,3 +77,31 @@ def test_a_truth_must_be_clean(tmp_path: Path, text: str, message: str) -> None:
 def test_missing_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such truth file"):
         read_truth_table(tmp_path / "none.csv")
+
+
+def test_decimal_commas_with_semicolons(tmp_path: Path) -> None:
+    text = "time;lat;lon;h\n" + ROWS.replace(",", ";").replace(".", ",")
+    table = read_truth_table(put(tmp_path, text))
+    assert table["lat_deg"].tolist() == [50.5, 50.6]
+
+
+def test_the_time_scale_serves_a_file_that_does_not_say_it(tmp_path: Path) -> None:
+    silent = put(tmp_path, "time,lat,lon,h\n" + ROWS)
+    assert str(read_truth_table(silent, time_scale="UTC").index[0]) == "2025-05-23 14:09:34"
+    assert str(read_truth_table(silent, time_scale="GPST").index[0]) == "2025-05-23 14:09:16"
+    said = put(tmp_path, "gpst,lat,lon,h\n" + ROWS)
+    assert str(read_truth_table(said, time_scale="UTC").index[0]) == "2025-05-23 14:09:16"
+
+
+def test_an_undulation_for_the_recording_leaves_ellipsoidal_heights(tmp_path: Path) -> None:
+    table = read_truth_table(put(tmp_path, "time,lat,lon,h\n" + ROWS), geoid=44.5)
+    assert table["height_m"].tolist() == [289.5, 289.6]
+    own = tmp_path / "own.parquet"
+    parquet.write([Recording(table)], own)
+    pd.testing.assert_frame_equal(read_truth_table(own, time_scale="UTC", geoid=44.5), table)
+
+
+def test_a_pipe_is_no_truth(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="no regular file"):
+        read_truth_table(tmp_path / "pipe")
