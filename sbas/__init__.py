@@ -14,7 +14,10 @@ from sbas.exceptions import InputError, ModelError, SbasError
 from sbas.findings import Finding
 from sbas.input_check import check, repair
 from sbas.integrity import (
+    compare,
+    decorrelation,
     evaluate,
+    explain,
     failure_rate,
     k_factor,
     k_models,
@@ -43,7 +46,10 @@ __all__ = [
     "Trajectory",
     "__version__",
     "check",
+    "compare",
+    "decorrelation",
     "evaluate",
+    "explain",
     "failure_rate",
     "k_factor",
     "k_models",

@@ -1,6 +1,9 @@
 """From a recording and its truth to errors, regions, events, availability and rates."""
 
 from sbas.integrity.allocation import load_allocation
+from sbas.integrity.causes import explain
+from sbas.integrity.comparison import compare
+from sbas.integrity.correlation import decorrelation
 from sbas.integrity.evaluation import evaluate
 from sbas.integrity.exposure_models import k_models
 from sbas.integrity.failure_rates import failure_rate
@@ -11,7 +14,10 @@ from sbas.integrity.position_error import position_errors
 from sbas.integrity.railway_levels import railway_hpl
 
 __all__ = [
+    "compare",
+    "decorrelation",
     "evaluate",
+    "explain",
     "failure_rate",
     "k_factor",
     "k_models",

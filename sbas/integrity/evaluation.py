@@ -218,6 +218,7 @@ def _evaluation(
             events=len(events),
             runs=len(tally.mi.whole() if kind == "mi" else tally.at_limit(kind, limit)),
             event_hours=float(events.duration_s.sum()) / 3600,
+            merge_hours=settings.merge_s / 3600,
             judged_hours=(exposure.error_hours if kind == "exceeds_al" else exposure.judged_hours),
             confidence=settings.confidence,
             lower_bound=lower_bound,

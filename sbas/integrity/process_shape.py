@@ -13,10 +13,10 @@ from sbas.integrity.robust_tau import fit_exponentials
 
 EARLY, LATE = (0.95, 0.7), (0.5, 0.25)
 MIXTURE_RATIO, MIXTURE_EXPONENT, SMOOTH_EXPONENT = 1.5, 0.75, 1.4
-GAUSS_MARKOV_EXPONENT = 0.892249
-"""Short-lag exponent of exp(-t/tau) at a lag of tau/20."""
 CHANCE = 2.5
 """Standard deviations that are left to chance: 3 of 500 Gauss-Markov records lie beyond."""
+COARSE = 0.25
+"""A lag above this share of tau tells nothing about short lags: the ratio alone is judged."""
 RATIO_SIGMA, EXPONENT_SIGMA, EXPONENT_WHITE_SIGMA = 2.2, 0.54, 1.45
 """Sampling error: ln(late/early) and exponent times sqrt(tau/T), and the exponent's white part.
 
@@ -29,12 +29,16 @@ Shape = Literal["gm1", "smooth", "mixture"]
 
 @dataclass(frozen=True)
 class ProcessShape:
-    """Two figures that are 1 and about 0.9 for a Gauss-Markov process; NaN where undefined."""
+    """Two figures that are 1 and about 0.9 for a Gauss-Markov process; NaN where undefined.
+
+    `amplitude` and `tau_s` of the exponential fit; `exponent_lag_s` is the lag of the exponent.
+    """
 
     late_over_early: float
     short_lag_exponent: float
     amplitude: float
     tau_s: float
+    exponent_lag_s: float
 
 
 def short_lag_exponent(r: Floats, lag: int) -> float:
@@ -47,13 +51,24 @@ def short_lag_exponent(r: Floats, lag: int) -> float:
 
     Returns
     -------
-    log2[(r(2l) - r(4l))/(r(l) - r(2l))]; NaN where r does not fall. Source: method page 3.2;
-    Gneiting, Sevcikova, Percival 2012 (variogram estimators of the fractal index).
+    log2[(r(2l) - r(4l))/(r(l) - r(2l))]; -inf where r does not fall at one of these lags, NaN
+    where it is not known. Source: method page 3.2; Gneiting, Sevcikova, Percival 2012
+    (variogram estimators of the fractal index).
     """
     if 4 * lag >= r.size:
         return math.nan
     near, far = r[lag] - r[2 * lag], r[2 * lag] - r[4 * lag]
-    return math.log2(far / near) if near > 0 and far > 0 else math.nan
+    if math.isnan(near) or math.isnan(far):
+        return math.nan
+    return math.log2(far / near) if near > 0 and far > 0 else -math.inf
+
+
+def gauss_markov_exponent(x: float) -> float:
+    """Short-lag exponent of r(t) = exp(-t/tau) at the lag l with x = exp(-l/tau).
+
+    (x^2 - x^4)/(x - x^2) = x (1 + x): 0.892 at tau/20, 1 in the limit of short lags.
+    """
+    return math.log2(x * (1 + x))
 
 
 def late_over_early(r: Floats, amplitude: float) -> float:
@@ -76,9 +91,15 @@ def process_shape(acf: Autocorrelation) -> ProcessShape:
     fit = fit_exponentials(r[None], acf.step_s)
     tau, amplitude = float(fit.tau_s[0]), float(fit.amplitude[0])
     if not math.isfinite(tau):
-        return ProcessShape(math.nan, math.nan, math.nan, math.inf)
+        return ProcessShape(math.nan, math.nan, math.nan, math.inf, math.nan)
     lag = max(2, round(tau / (20 * acf.step_s)))
-    return ProcessShape(late_over_early(r, amplitude), short_lag_exponent(r, lag), amplitude, tau)
+    return ProcessShape(
+        late_over_early(r, amplitude),
+        short_lag_exponent(r, lag),
+        amplitude,
+        tau,
+        lag * acf.step_s,
+    )
 
 
 def shape_verdict(shape: ProcessShape, *, recorded_s: float, step_s: float) -> Shape:
@@ -93,7 +114,7 @@ def shape_verdict(shape: ProcessShape, *, recorded_s: float, step_s: float) -> S
 
     Notes
     -----
-    `mixture` from late/early > 1.5 or exponent < 0.75 (or undefined), `smooth` from exponent
+    `mixture` from late/early > 1.5 or exponent < 0.75 (or -inf), `smooth` from exponent
     > 1.4 (method page 3.2). A short or noisy record reaches these by chance: the limits are
     moved outward to `CHANCE` standard deviations there.
     """
@@ -102,15 +123,21 @@ def shape_verdict(shape: ProcessShape, *, recorded_s: float, step_s: float) -> S
     share = math.sqrt(shape.tau_s / recorded_s)
     nugget = min(max(0.0, 1 - shape.amplitude), 0.9)
     white = math.sqrt(nugget * (2 - nugget) * step_s / (2 * recorded_s))
+    x = math.exp(-shape.exponent_lag_s / shape.tau_s)
     sigma = math.hypot(
-        EXPONENT_SIGMA * share, EXPONENT_WHITE_SIGMA * white / (0.046 * (1 - nugget))
+        EXPONENT_SIGMA * share, EXPONENT_WHITE_SIGMA * white / ((x - x**2) * (1 - nugget))
     )
-    least = min(MIXTURE_EXPONENT, GAUSS_MARKOV_EXPONENT - CHANCE * sigma)
-    most = max(SMOOTH_EXPONENT, GAUSS_MARKOV_EXPONENT + CHANCE * sigma)
+    # The limits are meant for a lag of tau/20; a coarse step has only longer ones.
+    expected = gauss_markov_exponent(x)
+    shift = expected - gauss_markov_exponent(math.exp(-1 / 20))
+    least = min(MIXTURE_EXPONENT + shift, expected - CHANCE * sigma)
+    most = max(SMOOTH_EXPONENT + shift, expected + CHANCE * sigma)
     steepest = max(math.log(MIXTURE_RATIO), CHANCE * RATIO_SIGMA * share)
+    if shape.late_over_early > math.exp(steepest):
+        return "mixture"
+    if not shape.exponent_lag_s <= COARSE * shape.tau_s:
+        return "gm1"
     exponent = shape.short_lag_exponent
-    if math.isnan(exponent):
-        return "mixture" if least > 0 else "gm1"
-    if exponent < least or math.log(shape.late_over_early) > steepest:
+    if exponent < least:
         return "mixture"
     return "smooth" if exponent > most else "gm1"

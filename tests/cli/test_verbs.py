@@ -276,7 +276,18 @@ def test_a_moving_recording_without_truth_gives_levels_but_no_rate(
 
 
 @pytest.mark.parametrize(
-    "verb", ["demo", "simulate", "check", "evaluate", "kfactor", "rate", "plan"]
+    "verb",
+    [
+        "demo",
+        "simulate",
+        "check",
+        "evaluate",
+        "kfactor",
+        "rate",
+        "plan",
+        "decorrelation",
+        "compare",
+    ],
 )
 def test_every_verb_has_help_with_an_example(capsys: pytest.CaptureFixture[str], verb: str) -> None:
     answer = Answer(capsys, verb, "--help")
@@ -334,3 +345,59 @@ def test_kfactor_over_an_exposure(capsys: pytest.CaptureFixture[str]) -> None:
     for wrong in (("--tau-s", "0.5"), ("--nugget", "2"), ("--one-sided",)):
         assert Answer(capsys, *asked, *wrong).code == 2
     assert Answer(capsys, "kfactor", "--risk", "5e-8", "--tau-s", "360").code == 2
+
+
+def test_options_of_times_and_heights_reach_the_truth(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    rows = [f"2025-05-23 14:{m:02d}:{s:02d};50,5;15,5;" for m in range(2) for s in range(60)]
+    log, truth = tmp_path / "log.csv", tmp_path / "truth.csv"
+    log.write_text("time;lat;lon;alt;hpl\n" + "".join(f"{row}245,0;11,5\n" for row in rows))
+    truth.write_text("time;lat;lon;alt\n" + "".join(f"{row}245,0\n" for row in rows))
+    options = ("--time-scale", "UTC", "--geoid", "44.5", "--truth", truth, "--json", "--quiet")
+    result = Answer(capsys, "evaluate", log, *options).json
+    assert result["hpe_m"]["max"] < 1e-6
+    assert result["vpe_m"]["max"] < 1e-6
+    assert Answer(capsys, "check", log, *options).code == 0
+    rate = Answer(capsys, "rate", log, "--alert-limit", "25", *options)
+    assert rate.json["hours"] > 0
+
+
+def test_decorrelation_of_the_real_hour_is_too_short_to_tell(
+    capsys: pytest.CaptureFixture[str], reference_data: Path
+) -> None:
+    path = reference_data / "data/egnos_debrecen_2016194/debr194m.pos"
+    plain = Answer(capsys, "decorrelation", path, "--json").json
+    assert plain["tau_s"] is None
+    assert plain["tau_low_s"] < 360
+    assert plain["tau_high_s"] is None or plain["tau_high_s"] > 360
+    assert plain["misfit"] == "record_too_short"
+    assert "too short" in plain["verdict"]
+
+
+def test_decorrelation_refuses_in_words(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    few = stored(tmp_path / "few.parquet", quiet(10))
+    answer = Answer(capsys, "decorrelation", few, *TRUTH)
+    assert "not given" in answer.out
+    twice = quiet(300)
+    table = twice.table.iloc[np.repeat(np.arange(300), 2)]
+    again = stored(tmp_path / "twice.parquet", twice.replace(table=table))
+    assert Answer(capsys, "decorrelation", again, *TRUTH).code == 2
+    assert Answer(capsys, "decorrelation", few, "--segments", "hourly").code == 2
+
+
+def test_compare_two_receivers(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    one = stored(tmp_path / "a.parquet", quiet(3600, seed=1))
+    two = stored(tmp_path / "b.parquet", quiet(3600, seed=2))
+    answer = Answer(capsys, "compare", one, two, *TRUTH, "--json")
+    assert answer.code == 0
+    plain = answer.json
+    # The difference of two independent errors of 0.5 m an axis has a median of
+    # 0.5 sqrt(2) sqrt(2 ln 2) = 0.833 m.
+    assert plain["difference_m"]["median"] == pytest.approx(0.833, rel=0.05)
+    assert plain["availability_a"]["50"] == plain["availability_b"]["50"] == 1.0
+    assert "epochs" in Answer(capsys, "compare", one, two).out
+    late = quiet(100)
+    later = late.replace(table=late.table.set_axis(late.table.index + np.timedelta64(9, "D")))
+    apart = stored(tmp_path / "c.parquet", later)
+    assert Answer(capsys, "compare", one, apart).code == 2

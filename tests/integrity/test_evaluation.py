@@ -57,9 +57,9 @@ def test_events_and_rates_by_hand() -> None:
     assert len(at[50.0].events["mi"]) == 4
     rate = at[20.0].rates["hmi"]
     assert rate.events == 2
-    # Ten epochs have no level, and 42 s lie within the two events: no event can begin there.
+    # Ten epochs have no level; none begins in the two events of 42 s, nor in 60 s after each.
     assert rate.event_hours == pytest.approx(42 / 3600)
-    assert rate.hours == pytest.approx((4000 - 10 - 42) / 3600)
+    assert rate.hours == pytest.approx((4000 - 10 - 42 - 120) / 3600)
     assert isinstance(rate.demonstrated, Estimate)
     # Two events, one-sided 95 %: chi-square 0.95 quantile with 6 degrees of freedom is 12.59159.
     assert rate.demonstrated.upper == pytest.approx(12.591587243743977 / 2 / rate.hours, rel=1e-9)

@@ -1,0 +1,80 @@
+"""The verb on two recordings of the same epochs: compare."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sbas.cli import inputs, output
+from sbas.integrity.comparison import compare as compare_sources
+from sbas.integrity.comparison_results import PAPER_TAU_S
+
+
+def register(app: typer.Typer) -> None:
+    app.command("compare")(compare)
+
+
+def compare(
+    a: Annotated[Path, typer.Argument(help="First recording, such as the one in PA mode.")],
+    b: Annotated[Path, typer.Argument(help="Second recording of the same hours.")],
+    truth: inputs.TruthText = None,
+    alert_limit: Annotated[str, typer.Option(help="Alert limits in metres.")] = "50,25,20",
+    tau_s: Annotated[
+        float, typer.Option("--tau-s", help="1/e time of what correlates epochs, in seconds.")
+    ] = PAPER_TAU_S,
+    confidence: Annotated[float, typer.Option(help="Of the two-sided intervals.")] = 0.95,
+    frame: inputs.Frame = "",
+    antenna_height: inputs.AntennaHeight = 0.0,
+    truth_max_step: inputs.MaxStep = 1.0,
+    accept: inputs.Accept = None,
+    format_name: inputs.FormatName = None,
+    time_scale: inputs.TimeScaleName = None,
+    mode_map: inputs.ModeMap = None,
+    geoid: inputs.Geoid = None,
+    sort: inputs.Sort = False,
+    duplicates: inputs.Duplicates = None,
+    pl_zero: inputs.PlZero = None,
+    json: output.Json = False,
+    quiet: output.Quiet = False,
+) -> None:
+    """PA or NPA, receiver 1 or 2? Positions, levels and availability at the same epochs.
+
+    Example:  sbas compare pa.sbf npa.sbf --truth 50.03,15.77,289.4
+    """
+    known = inputs.open_truth(
+        truth,
+        frame=frame,
+        antenna_height_m=antenna_height,
+        max_step_s=truth_max_step,
+        time_scale=time_scale,
+        geoid=geoid,
+    )
+    first, second = (
+        inputs.open_source(
+            [path],
+            format_name=format_name,
+            time_scale=time_scale,
+            mode_map=mode_map,
+            geoid=geoid,
+            sort=sort,
+            duplicates=duplicates,
+            pl_zero=pl_zero,
+            quiet=quiet,
+        )
+        for path in (a, b)
+    )
+    result = compare_sources(
+        first,
+        second,
+        truth=known,
+        alert_limits_m=inputs.alert_limits(alert_limit),
+        tau_s=tau_s,
+        confidence=confidence,
+        accept_findings=accept or (),
+    )
+    if json:
+        output.print_json(result.to_dict())
+    else:
+        print(result)
