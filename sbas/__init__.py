@@ -1,37 +1,41 @@
 """SBAS protection levels and integrity risk for railway signalling.
 
 The questions are functions: `read` a recording, `check` it, `evaluate` it against a truth,
-ask for its `failure_rate`, a `k_factor` or the hours to `plan_hours`, `simulate` a laboratory
-and write a `report`.
+ask for its `failure_rate`, its `decorrelation` or a `k_factor`, `compare` two receivers,
+`simulate` a laboratory and write a `report`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import importlib
+from typing import TYPE_CHECKING, Any
 
 from sbas.estimate import Estimate, Refusal
 from sbas.exceptions import InputError, ModelError, SbasError
 from sbas.findings import Finding
 from sbas.input_check import check, repair
-from sbas.integrity import (
-    compare,
-    decorrelation,
-    evaluate,
-    explain,
-    failure_rate,
-    k_factor,
-    k_models,
-    k_verdict,
-    load_allocation,
-    plan_hours,
-    position_errors,
-    railway_hpl,
-)
-from sbas.laboratory import simulate
 from sbas.logs import read, read_truth_table, scan
 from sbas.recording import Recording, RecordingMeta
 from sbas.truth import FixedPoint, Trajectory
 from sbas.version import __version__
+
+if TYPE_CHECKING:
+    from sbas.integrity import (
+        compare,
+        decorrelation,
+        evaluate,
+        explain,
+        failure_rate,
+        k_factor,
+        k_models,
+        k_verdict,
+        load_allocation,
+        plan_hours,
+        position_errors,
+        railway_hpl,
+    )
+    from sbas.laboratory import simulate
+    from sbas.reporting import report
 
 __all__ = [
     "Estimate",
@@ -66,11 +70,22 @@ __all__ = [
     "simulate",
 ]
 
+_LATER = {
+    **dict.fromkeys(
+        (
+            "compare", "decorrelation", "evaluate", "explain", "failure_rate", "k_factor",
+            "k_models", "k_verdict", "load_allocation", "plan_hours", "position_errors",
+            "railway_hpl",
+        ),
+        "sbas.integrity",
+    ),
+    "simulate": "sbas.laboratory",
+    "report": "sbas.reporting",
+}  # fmt: skip
+
 
 def __getattr__(name: str) -> Any:
-    # Drawing is loaded when the first report is asked for: `import sbas` stays light.
-    if name == "report":
-        from sbas.reporting import report
-
-        return report
+    # Analyses and drawing are loaded when the first of them is asked for: reading needs neither.
+    if name in _LATER:
+        return getattr(importlib.import_module(_LATER[name]), name)
     raise AttributeError(f"module 'sbas' has no attribute {name!r}")
