@@ -12,7 +12,7 @@ import sys
 import time
 from collections import Counter
 
-from tests.integrity.cause_cases import KINDS, explained
+from tests.integrity.causes.cause_cases import KINDS, explained
 
 
 def main() -> None:

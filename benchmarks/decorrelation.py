@@ -24,11 +24,11 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sbas.estimate import Estimate
-from sbas.integrity.autocorrelation import autocorrelation
-from sbas.integrity.correlation import decorrelation_of
-from sbas.integrity.process_shape import process_shape
-from sbas.integrity.robust_tau import clean, fit_exponentials, longest_lag
-from sbas.integrity.tau_interval import tau_interval
+from sbas.integrity.correlation.autocorrelation import autocorrelation
+from sbas.integrity.correlation.correlation import decorrelation_of
+from sbas.integrity.correlation.process_shape import process_shape
+from sbas.integrity.correlation.robust_tau import clean, fit_exponentials, longest_lag
+from sbas.integrity.correlation.tau_interval import tau_interval
 
 SECONDS = 300_000
 MASKS = 6

@@ -12,9 +12,9 @@ import math
 
 import numpy as np
 
-from sbas.integrity.exposure import Exposure
-from sbas.integrity.gauss_markov import siegmund_risk
-from sbas.integrity.gauss_markov_sampled import ar1_risk
+from sbas.integrity.exposure.exposure import Exposure
+from sbas.integrity.exposure.gauss_markov import siegmund_risk
+from sbas.integrity.exposure.gauss_markov_sampled import ar1_risk
 
 RECORDS = 60_000
 CASES = ((3, 36, 360), (3, 100, 42), (3.5, 36, 360), (3, 5, 360))

@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from sbas.integrity.exposure import Exposure
-from sbas.integrity.exposure_models import exposure_k, exposure_risk
+from sbas.integrity.exposure.exposure import Exposure
+from sbas.integrity.exposure.exposure_models import exposure_k, exposure_risk
 
 
 def fastest(question: Callable[[], float]) -> float:

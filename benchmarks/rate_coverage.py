@@ -20,12 +20,12 @@ from scipy import optimize, signal
 
 from sbas.estimate import Estimate
 from sbas.integrity.counting import garwood_limits
-from sbas.integrity.declustering import count_exceedances, demonstrated_rate, merge_time_s
-from sbas.integrity.extremal_clusters import run_clusters
-from sbas.integrity.gauss_markov_sampled import extremal_index
-from sbas.integrity.sampled_clock import hazard_per_s
-from sbas.integrity.tail_fit import fit_tail
-from sbas.integrity.tail_model import modelled_rate
+from sbas.integrity.exposure.extremal_clusters import run_clusters
+from sbas.integrity.exposure.gauss_markov_sampled import extremal_index
+from sbas.integrity.tails.declustering import count_exceedances, demonstrated_rate, merge_time_s
+from sbas.integrity.tails.sampled_clock import hazard_per_s
+from sbas.integrity.tails.tail_fit import fit_tail
+from sbas.integrity.tails.tail_model import modelled_rate
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from sbas.cli import inputs, output
-from sbas.integrity.comparison import compare as compare_sources
-from sbas.integrity.comparison_results import PAPER_TAU_S
+from sbas.integrity.comparison.comparison import compare as compare_sources
+from sbas.integrity.comparison.comparison_results import PAPER_TAU_S
 
 
 def register(app: typer.Typer) -> None:

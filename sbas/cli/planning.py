@@ -11,7 +11,7 @@ from rich.table import Table
 
 from sbas.cli import output
 from sbas.integrity.allocation import load_allocation
-from sbas.integrity.exposure_models import KModels, k_models
+from sbas.integrity.exposure.exposure_models import KModels, k_models
 from sbas.integrity.k_factors import k_factor
 from sbas.integrity.planning import plan_hours
 from sbas.numerals import upward

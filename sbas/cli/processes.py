@@ -8,7 +8,7 @@ import typer
 
 from sbas.cli import inputs, output
 from sbas.estimate import Refusal
-from sbas.integrity.correlation import decorrelation as decorrelation_of_source
+from sbas.integrity.correlation.correlation import decorrelation as decorrelation_of_source
 
 
 def register(app: typer.Typer) -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbas.estimate import Estimate
-from sbas.integrity.decorrelation_results import ASSUMED_TAU_S, Curve, Decorrelation
-from sbas.integrity.two_processes import seconds_text
+from sbas.integrity.correlation.decorrelation_results import ASSUMED_TAU_S, Curve, Decorrelation
+from sbas.integrity.correlation.two_processes import seconds_text
 from sbas.plots.style import (
     BLUE,
     GREEN,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbas.estimate import Refusal
-from sbas.integrity.comparison_results import Comparison
+from sbas.integrity.comparison.comparison_results import Comparison
 from sbas.plots.style import (
     BLUE,
     FULL_WIDTH,
@@ -35,7 +35,7 @@ def pair_strips(comparison: Comparison, *, axes: Sequence[Axes] | None = None) -
 
     Parameters
     ----------
-    comparison : result of `sbas.integrity.comparison.compare`.
+    comparison : result of `sbas.integrity.comparison.comparison.compare`.
     axes : four axes, from top to bottom; a new figure without them.
 
     Returns

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbas.estimate import Refusal
-from sbas.integrity.tail_family import tail_family
-from sbas.integrity.tail_fit import TailFit
-from sbas.integrity.tail_model import tail_probability
+from sbas.integrity.tails.tail_family import tail_family
+from sbas.integrity.tails.tail_fit import TailFit
+from sbas.integrity.tails.tail_model import tail_probability
 from sbas.plots.style import (
     BLUE,
     HALF_HEIGHT,
@@ -43,7 +43,7 @@ def tail_plot(
 
     Parameters
     ----------
-    fit : result of `sbas.integrity.tail_model.fit_tail`. A refused fit is drawn as a broken
+    fit : result of `sbas.integrity.tails.tail_model.fit_tail`. A refused fit is drawn as a broken
         line with the reason: no rate may be read off it.
     level_k : level over sigma to mark, such as 6.18.
     confidence : of the two-sided band.
@@ -89,8 +89,8 @@ def threshold_stability(fit: TailFit | Refusal, *, ax: Axes | None = None) -> Ax
 
     Parameters
     ----------
-    fit : result of `sbas.integrity.tail_model.fit_tail`. Bars are two standard deviations that
-        Gaussian records of this length and correlation show.
+    fit : result of `sbas.integrity.tails.tail_fit.fit_tail`. Bars are two standard deviations
+        that Gaussian records of this length and correlation show.
     ax : axes to draw on; a new figure without them.
     """
     with drawing(None if ax is None else [ax], SHEET) as (ax,):

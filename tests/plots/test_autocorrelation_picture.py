@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from scipy.signal import lfilter
 
 from sbas.estimate import Refusal
-from sbas.integrity.correlation import decorrelation_of
-from sbas.integrity.decorrelation_results import Decorrelation
+from sbas.integrity.correlation.correlation import decorrelation_of
+from sbas.integrity.correlation.decorrelation_results import Decorrelation
 from sbas.plots.autocorrelation_picture import decorrelation_curve
 
 

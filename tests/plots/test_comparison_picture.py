@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from sbas.integrity.comparison import compare
-from sbas.integrity.comparison_results import Comparison
+from sbas.integrity.comparison.comparison import compare
+from sbas.integrity.comparison.comparison_results import Comparison
 from sbas.plots.comparison_picture import pair_strips
 from sbas.recording import Recording
 from tests.examples import quiet

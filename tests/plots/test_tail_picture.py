@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from sbas.estimate import Refusal
 from sbas.plots.tail_picture import tail_plot, threshold_stability
-from tests.integrity.test_tail_fit import TAU, amplitude, fitted, gauss_markov
+from tests.integrity.tails.test_tail_fit import TAU, amplitude, fitted, gauss_markov
 
 FITS = {
     "fits": fitted(gauss_markov(21)),

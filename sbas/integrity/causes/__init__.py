@@ -1,0 +1,1 @@
+"""What made a level spike or an error mislead."""

@@ -1,0 +1,1 @@
+"""Two recordings of the same hours, and shares of time with intervals."""

@@ -1,0 +1,1 @@
+"""How long position errors stay correlated: estimate, interval, misfit."""

@@ -1,0 +1,1 @@
+"""Beyond counting: declustered events, fitted tails, overbounds, priors."""
