@@ -15,7 +15,9 @@ import sbas.plots
 from sbas.integrity.evaluation import evaluate
 from tests.plots.synthetic import KINDS, TRUTH, evaluated, synthetic_recording
 
-PICTURES = sbas.plots.__all__
+OF_OTHER_RESULTS = {"decorrelation_curve", "pair_strips", "tail_plot", "threshold_stability"}
+"""Drawn from results of their own; tested beside them."""
+PICTURES = [name for name in sbas.plots.__all__ if name not in OF_OTHER_RESULTS]
 
 
 def _draw(name: str, evaluation: Any, figure: Figure | None) -> Any:
