@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -23,11 +23,10 @@ from sbas.integrity.results import (
 )
 from sbas.integrity.stanford import REGIONS
 from sbas.integrity.tallies import CURVE_LIMITS_M, LEVEL_GRID_M, LIMIT_KINDS, RecordTally
+from sbas.logs.format import Progress
 from sbas.recording import EpochSource, RecordingMeta
 from sbas.timescales import NS_PER_S
 from sbas.truth import FixedPoint, Truth
-
-Progress = Callable[[int, int], None]
 
 
 def evaluate(

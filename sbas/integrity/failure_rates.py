@@ -9,10 +9,11 @@ from typing import Any
 from sbas.estimate import Estimate, Refusal
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.integrity.evaluation import Progress, evaluate
+from sbas.integrity.evaluation import evaluate
 from sbas.integrity.rate_evidence import EVENT_KINDS, EventKind, RateEvidence
 from sbas.integrity.results import EvaluationSettings
 from sbas.integrity.sil import SilVerdict, TargetVerdict, meets, sil_verdict
+from sbas.logs.format import Progress
 from sbas.recording import EpochSource
 from sbas.truth import Truth
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from sbas.recording import EpochSource, Recording
 
 Progress = Callable[[int, int], None]
-"""Called with (bytes done, bytes in all) as a reader or writer goes on."""
+"""Called with (done, in all) as long work goes on: bytes of a reader or writer, else epochs."""
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,20 @@ def section(evaluation: Evaluation) -> Section:
     hours = evaluation.exposure
     gaps = len(evaluation.input.survey.gaps)
     rows = [
-        ("recorded", hours.recorded_hours, f"{count(evaluation.epochs)} epochs times the interval"),
+        (
+            "recorded",
+            hours.recorded_hours,
+            f"{count(evaluation.epochs)} epochs, each its step, at most the interval",
+        ),
         ("in gaps", hours.gap_hours, f"gaps: {count(gaps)}; not recorded, part of no rate"),
         ("without error", hours.without_error_hours, "no fix, or no truth at the epoch"),
         ("without level", hours.without_level_hours, "HPL missing, invalid or outside SBAS mode"),
         ("with error", hours.error_hours, "exposure of HPE ≥ AL"),
-        ("judged", hours.judged_hours, "with error and level: exposure of HMI and MI"),
+        (
+            "judged",
+            hours.judged_hours,
+            "with error and level; a rate takes off its events and the merge time after each",
+        ),
     ]
     return Section(
         "exposure",

@@ -32,7 +32,7 @@ METHODS = (
            "runs of epochs; merged, then held against the time to alert (Navipedia, EGNOS "
            "Performances: 10 s NPA, 6 s PA)"),
     Method("exposure", "exposure in hours", "sbas.integrity.evaluation.evaluate",
-           "epochs times the median step; gap: step above 1.5 median steps"),
+           "an epoch covers its step, at most the median one; gap: step above 1.5 median steps"),
     Method("rates", "demonstrated rate and its bound", "sbas.integrity.counting.poisson_bounds",
            "F. Garwood, Biometrika 28 (1936) 437"),
     Method("classes", "evidence classes, claimed rate",
