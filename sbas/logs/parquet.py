@@ -393,7 +393,7 @@ def _side_tables(path: Path, layout: Layout) -> tuple[dict[str, pd.DataFrame], t
             problem = "was altered since the recording was written"
         else:
             with opened(file) as companion:
-                tables[name] = companion.read().to_pandas()
+                tables[name] = _side_frame(companion.read())
         if problem:
             findings.append(
                 Finding(
@@ -405,6 +405,16 @@ def _side_tables(path: Path, layout: Layout) -> tuple[dict[str, pd.DataFrame], t
                 )
             )
     return tables, tuple(findings)
+
+
+def _side_frame(table: pa.Table) -> pd.DataFrame:
+    """A side table as it was written; pandas cannot itself read fixed-size binary back."""
+
+    def mapped(kind: pa.DataType) -> pd.ArrowDtype | None:
+        return pd.ArrowDtype(kind) if pa.types.is_fixed_size_binary(kind) else None
+
+    frame: pd.DataFrame = table.to_pandas(ignore_metadata=True, types_mapper=mapped)
+    return frame
 
 
 def sniff(head: bytes, middle: bytes, tail: bytes, path: Path) -> Match:

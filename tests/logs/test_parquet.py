@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
+from sbas.laboratory import simulate
 from sbas.logs import parquet, parquet_writer
 from sbas.recording import (
     COLUMNS,
@@ -224,6 +225,15 @@ def test_side_tables(tmp_path: Path) -> None:
     assert "altered" in altered.meta.findings[-1].message
     companion.unlink()
     assert "missing" in parquet.read(path).meta.findings[-1].message
+
+
+def test_a_simulated_recording_comes_back_with_its_raw_frames(tmp_path: Path) -> None:
+    made = simulate(hours=0.1, seed=3)
+    assert made.side_tables["sbas_frames"]["frame"].dtype == pd.ArrowDtype(pa.binary(32))
+    back = parquet.read(written(tmp_path, made))
+    assert set(back.side_tables) == set(made.side_tables)
+    for name, side in made.side_tables.items():
+        pd.testing.assert_frame_equal(back.side_tables[name], side)
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
