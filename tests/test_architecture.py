@@ -16,7 +16,7 @@ PACKAGE = Path(sbas.__file__).parent
 LAYERS = (
     "version", "numerals", "exceptions", "findings", "timescales", "estimate", "recording",
     "bundled", "streaming", "recording_survey", "truth", "input_check", "logs", "laboratory",
-    "integrity", "plots", "reporting", "cli",
+    "integrity", "dependability", "plots", "reporting", "cli",
 )  # fmt: skip
 """From the ground up: a module imports only from its own layer and those before it."""
 

@@ -13,18 +13,27 @@ from rich.table import Table
 from sbas.cli import inputs, output
 from sbas.estimate import Estimate, Refusal
 from sbas.exceptions import InputError
+from sbas.integrity.causes.causes import Causes, explain
 from sbas.integrity.evaluation import evaluate
 from sbas.integrity.failure_rates import FailureRate, failure_rate
 from sbas.integrity.rate_evidence import EVENT_KINDS
 from sbas.integrity.results import Evaluation, EvaluationSettings
 from sbas.numerals import percent, share, upward
+from sbas.recording import EpochSource
+from sbas.truth import Truth
+
+MOST_EXPLAINED = 5_000_000
+"""Longer records are not explained in a report: their columns would have to be in memory."""
 
 _DEFAULTS = EvaluationSettings()
 
 TimeToAlert = Annotated[
     float, typer.Option("--time-to-alert", help="Shortest HMI event, in seconds.")
 ]
-Merge = Annotated[float, typer.Option("--merge", help="Closer events are one; in seconds.")]
+Merge = Annotated[
+    float | None,
+    typer.Option("--merge", help="Closer events are one; in seconds. Else max(tau/2, 60 s)."),
+]
 Reset = Annotated[
     float,
     typer.Option("--reset", help="Merge time of the event list, in seconds."),
@@ -102,13 +111,29 @@ def evaluate_files(
     if report is not None:
         from sbas.reporting import report as write_report  # drawing is loaded only where used
 
-        page = write_report(result, report)
+        causes = likely_causes(source, result, truth=known, accept=accept or ())
+        page = write_report(result, report, causes=causes)
     if json:
         output.print_json({**result.to_dict(), "report": None if page is None else str(page)})
         return
     print_verdict(result)
     if page is not None:
         print(f"\nreport  {page}")
+
+
+def likely_causes(
+    source: EpochSource, result: Evaluation, *, truth: Truth | None, accept: list[str] | tuple[()]
+) -> Causes | Refusal:
+    """Causes of the events of a recording that was evaluated, unless it is too long for memory."""
+    if result.epochs > MOST_EXPLAINED:
+        return Refusal(
+            f"{result.epochs:,} epochs are more than {MOST_EXPLAINED:,}",
+            "give parts of the record to sbas.explain",
+        )
+    try:
+        return explain(source, truth=truth, accept_findings=accept)
+    except InputError as error:
+        return Refusal(error.what, error.cure)
 
 
 def print_verdict(result: Evaluation) -> None:
@@ -132,7 +157,19 @@ def print_verdict(result: Evaluation) -> None:
             "-" if rate is None else _upper(rate.demonstrated),
         )
     output.console().print(table)
+    print(_processes(result))
     output.print_findings(result.findings)
+
+
+def _processes(result: Evaluation) -> str:
+    """The decorrelation time and what it means for the published K, in two lines."""
+    found = result.process.decorrelation
+    lines = [f"decorrelation  {found.tau_s}" if isinstance(found.tau_s, Refusal) else
+             f"decorrelation  tau {found.tau_s.value:.4g} s, {found.interval_text}; events of a "
+             f"rate are runs merged over {result.merge_s:.4g} s"]  # fmt: skip
+    judged = result.railway
+    words = judged if isinstance(judged, Refusal) else judged.as_claimed.verdict
+    return "\n".join([*lines, f"published K    {words}"])
 
 
 def _upper(figure: Estimate | Refusal) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 from sbas.estimate import Counted, Estimate
 from sbas.integrity.counting import poisson_bounds
 from sbas.integrity.events import Runs
+from sbas.integrity.shares.block_bootstrap import share_estimate
+from sbas.integrity.shares.time_spans import Spans, spans_of_runs
 from sbas.recording_survey import Gaps
 from sbas.timescales import NS_PER_S
 
 Ints = NDArray[np.int64]
 
 NOT_INFERRED = (
-    "describes this recording; epochs are correlated, so no interval follows from their number"
+    "describes this recording: epochs are correlated, and without a decorrelation time no "
+    "interval follows from their number"
 )
 
 
@@ -25,9 +28,10 @@ class Availability:
     """How often and how long the service was up.
 
     `availability` counts gaps as down, `availability_excluding_gaps` leaves them out of the
-    denominator. `mttf` and `mttr` are Estimates in hours: mean up time to a loss and mean time
-    to recovery; with no loss seen, `mttf` is its own lower bound. `continuity_risk` is
-    P(service lost within the window | up now), again with gaps as losses and without.
+    denominator; both with a lower bound where the decorrelation time is known. `mttf` and `mttr`
+    are Estimates in hours: mean up time to a loss and mean time to recovery; with no loss seen,
+    `mttf` is its own lower bound. `continuity_risk` is P(service lost within the window | up
+    now), again with gaps as losses and without.
     """
 
     availability: Estimate
@@ -74,6 +78,7 @@ def availability(
     down_ns: int,
     interval_ns: int,
     confidence: float,
+    tau_s: float | None,
     window_epochs: int = 15,
 ) -> Availability:
     """Availability figures from the runs of down epochs and the gaps of a record.
@@ -84,14 +89,16 @@ def availability(
     gaps : gaps of the record.
     up_ns, down_ns : time that up and down epochs cover [ns].
     interval_ns : sampling interval [ns].
-    confidence : one-sided, for the bounds of mttf and mttr.
+    confidence : one-sided, for every bound.
+    tau_s : upper limit of the decorrelation time [s]; None gives availability no bound.
     window_epochs : W of the continuity risk.
 
     Notes
     -----
     A loss is a transition from up to down. Down at the record's start is no loss; down at its
     end is no recovery. MTTF = up time / losses, MTTR = down time / recoveries; their bounds
-    take losses and recoveries as Poisson events (methods: integrity statistics, 4.3).
+    take losses and recoveries as Poisson events (methods: integrity statistics, 4.3). Bounds of
+    availability: `sbas.integrity.shares.block_bootstrap.share_estimate`.
     """
     hour_ns = 3600 * NS_PER_S
     down_rows = int(np.sum(down.last - down.first + 1))
@@ -124,16 +131,25 @@ def availability(
             Counted(recoveries, out_h, "recoveries"), "upper",
         )  # fmt: skip
     rows_first, rows_stop = _fused(down.first, down.last + 1)
-    with_gaps, without = up_h + down_h + gap_h, up_h + down_h
+    recorded = _recorded(down, gaps, interval_ns)
+    whole = Spans(recorded.start_ns[:1], recorded.end_ns[-1:])
+    up = recorded.without(spans_of_runs(down, interval_ns=interval_ns))
 
-    def fraction(hours: float) -> Estimate:
+    def fraction(hours: float, observed: Spans) -> Estimate:
         share = up_h / hours if hours else 0.0
+        if tau_s is not None and hours:
+            found = share_estimate(
+                up, observed, tau_s=tau_s, confidence=confidence, sided="lower",
+                interval_s=interval_ns / NS_PER_S, of="spans of service",
+            )  # fmt: skip
+            if isinstance(found, Estimate) and found.lower is not None:
+                return replace(found, value=share, lower=min(found.lower, share))
         basis = Counted(down.rows - down_rows, hours, "available epochs")
         return Estimate(share, None, None, None, "1", basis, "lower", (NOT_INFERRED,))
 
     return Availability(
-        fraction(with_gaps),
-        fraction(without),
+        fraction(up_h + down_h + gap_h, whole),
+        fraction(up_h + down_h, recorded),
         up_h,
         down_h,
         gap_h,
@@ -144,6 +160,14 @@ def availability(
         continuity_risk(first, stop, down.rows, window_epochs),
         continuity_risk(rows_first, rows_stop, down.rows, window_epochs),
         window_epochs,
+    )
+
+
+def _recorded(down: Runs, gaps: Gaps, interval_ns: int) -> Spans:
+    """The time of all epochs: the record without its gaps."""
+    return Spans(
+        np.append(down.begin_ns, gaps.after_ns),
+        np.append(gaps.before_ns, down.end_ns) + interval_ns,
     )
 
 

@@ -6,11 +6,17 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sbas.estimate import Refusal
 from sbas.findings import Finding, refuse_on_errors
 from sbas.input_check import CheckResult, accept, check
 from sbas.integrity.availability import availability
+from sbas.integrity.correlation.error_grid import ErrorGrid, GridFiller
+from sbas.integrity.epoch_levels import MODE_K_H, k_of_modes
+from sbas.integrity.error_process import error_process
 from sbas.integrity.events import Events, find_events
+from sbas.integrity.modelled_rates import modelled_event_rate
 from sbas.integrity.rate_evidence import EVENT_KINDS, EventKind, RateEvidence, rate_evidence
 from sbas.integrity.results import (
     AlertLimitResult,
@@ -24,9 +30,11 @@ from sbas.integrity.results import (
 from sbas.integrity.stanford import REGIONS
 from sbas.integrity.tallies import CURVE_LIMITS_M, LEVEL_GRID_M, LIMIT_KINDS, RecordTally
 from sbas.logs.format import Progress
-from sbas.recording import EpochSource, RecordingMeta
+from sbas.recording import MODES, EpochSource, RecordingMeta
 from sbas.timescales import NS_PER_S
 from sbas.truth import FixedPoint, Truth
+
+Floats = NDArray[np.float64]
 
 
 def evaluate(
@@ -35,7 +43,7 @@ def evaluate(
     truth: Truth | None = None,
     alert_limits_m: Sequence[float] = EvaluationSettings.alert_limits_m,
     time_to_alert_s: float = EvaluationSettings.time_to_alert_s,
-    merge_s: float = EvaluationSettings.merge_s,
+    merge_s: float | None = EvaluationSettings.merge_s,
     reset_s: float = EvaluationSettings.reset_s,
     confidence: float = EvaluationSettings.confidence,
     accept_findings: Iterable[str] = (),
@@ -125,6 +133,97 @@ def _own_median(checked: CheckResult) -> tuple[FixedPoint | None, Finding]:
     )  # fmt: skip
 
 
+def _k_of_mode(meta: RecordingMeta, tally: RecordTally) -> tuple[Floats, list[Finding]]:
+    """K behind each mode's levels; where nothing states it, that of the non-precision approach."""
+    names = (*MODES, "unknown")
+    usual = max(range(len(names)), key=lambda i: tally.modes[names[i]])
+    k = k_of_modes(meta.pl, -1 if names[usual] == "unknown" else usual)
+    levels = tally.levels.counts.sum(axis=1)
+    open_ = [i for i in (MODES.index("sbas"), -1) if np.isnan(k[i])]
+    assumed = int(levels[open_].sum())
+    if meta.pl.kind not in ("do229", "unknown") or not assumed:
+        return k, []
+    k[open_] = MODE_K_H["sbas_npa"]
+    return k, [
+        Finding(
+            "E23", "info",
+            f"{assumed:,} levels state neither mode nor K: sigma is taken as HPL/6.18 "
+            "(non-precision approach)",
+            evidence="used by modelled rates and the railway HPL, by no count",
+            cure="--mode-map, or a column mode with sbas_pa and sbas_npa",
+        )
+    ]  # fmt: skip
+
+
+def _remarks(
+    settings: EvaluationSettings,
+    truth: Truth | None,
+    tally: RecordTally,
+    hpe: Summary | None,
+    hpl: Summary | None,
+) -> list[Finding]:
+    """What only the errors and levels themselves can show to be wrong with the input."""
+    found = []
+    if tally.levels_left_out:
+        found.append(
+            Finding(
+                "E23",
+                "warning",
+                f"{tally.levels_left_out} epochs have a protection level outside SBAS mode or "
+                "declared invalid: counted as without level",
+            )
+        )
+    if hpe and hpl and hpe.median > 10 * hpl.median:
+        found.append(
+            Finding(
+                "E08",
+                "warning",
+                "errors are far larger than the levels: a wrong unit or truth?",
+                evidence=f"HPE median {hpe.median:.4g} m, HPL median {hpl.median:.4g} m",
+                cure="check the truth, and the units in the file's header",
+            )
+        )
+    if hpe and hpe.max < 1e-6:
+        found.append(
+            Finding(
+                "E12",
+                "warning",
+                "every error is zero: is the truth the recording itself?",
+                cure="give a truth that was measured independently",
+            )
+        )
+    if hpe and hpe.epochs < tally.positions:
+        found.append(
+            Finding(
+                "E01",
+                "warning",
+                f"the truth covers {hpe.epochs:,} of {tally.positions:,} epochs with a position",
+                evidence="the others are in no error and in no exposure",
+                cure="give a truth for the whole record, or --truth-max-step",
+            )
+        )
+    if truth is not None and not hpe:
+        found.append(
+            Finding(
+                "E01",
+                "warning",
+                "the truth covers no epoch that has a position: no error was formed",
+                cure="check the times and the steps of the trajectory",
+            )
+        )
+    if tally.truth_sigma_h_m > 0.1 * min(settings.alert_limits_m):
+        found.append(
+            Finding(
+                "E09",
+                "warning",
+                f"the truth is uncertain by up to {tally.truth_sigma_h_m:.3g} m (1-sigma), more "
+                f"than a tenth of the alert limit {min(settings.alert_limits_m):g} m",
+                cure="give a better truth",
+            )
+        )
+    return found
+
+
 def _evaluation(
     meta: RecordingMeta,
     settings: EvaluationSettings,
@@ -144,65 +243,27 @@ def _evaluation(
         judged_hours=tally.judged_ns / hour_ns,
         error_hours=tally.error_ns / hour_ns,
     )
-    if tally.levels_left_out:
-        findings.append(
-            Finding(
-                "E23",
-                "warning",
-                f"{tally.levels_left_out} epochs have a protection level outside SBAS mode or "
-                "declared invalid: counted as without level",
-            )
-        )
     hpe, hpl = Summary.of(tally.hpe), Summary.of(tally.hpl)
-    if hpe and hpl and hpe.median > 10 * hpl.median:
-        findings.append(
-            Finding(
-                "E08",
-                "warning",
-                "errors are far larger than the levels: a wrong unit or truth?",
-                evidence=f"HPE median {hpe.median:.4g} m, HPL median {hpl.median:.4g} m",
-                cure="check the truth, and the units in the file's header",
-            )
-        )
-    if hpe and hpe.max < 1e-6:
-        findings.append(
-            Finding(
-                "E12",
-                "warning",
-                "every error is zero: is the truth the recording itself?",
-                cure="give a truth that was measured independently",
-            )
-        )
-    if hpe and hpe.epochs < tally.positions:
-        findings.append(
-            Finding(
-                "E01",
-                "warning",
-                f"the truth covers {hpe.epochs:,} of {tally.positions:,} epochs with a position",
-                evidence="the others are in no error and in no exposure",
-                cure="give a truth for the whole record, or --truth-max-step",
-            )
-        )
-    if truth is not None and not hpe:
-        findings.append(
-            Finding(
-                "E01",
-                "warning",
-                "the truth covers no epoch that has a position: no error was formed",
-                cure="check the times and the steps of the trajectory",
-            )
-        )
-    if tally.truth_sigma_h_m > 0.1 * min(settings.alert_limits_m):
-        findings.append(
-            Finding(
-                "E09",
-                "warning",
-                f"the truth is uncertain by up to {tally.truth_sigma_h_m:.3g} m (1-sigma), more "
-                f"than a tenth of the alert limit {min(settings.alert_limits_m):g} m",
-                cure="give a better truth",
-            )
-        )
+    findings += _remarks(settings, truth, tally, hpe, hpl)
     lower_bound = truth is not None and truth.lower_bound
+    grid: ErrorGrid | Refusal
+    if isinstance(tally.grid, GridFiller):
+        grid, remarks = tally.grid.result()
+        findings += remarks
+    else:
+        grid = tally.grid
+    k_of_mode, assumed = _k_of_mode(meta, tally)
+    findings += assumed
+    process = error_process(
+        grid, k_of_mode=k_of_mode, confidence=settings.confidence, lower_bound=lower_bound
+    )
+    findings += process.decorrelation.findings
+    levels = tally.levels.result()
+    merge_s = process.merge_s if settings.merge_s is None else settings.merge_s
+    unknown_tau = isinstance(process.decorrelation.tau_s, Refusal)
+    caveats: tuple[str, ...] = ()
+    if settings.merge_s is None and unknown_tau:
+        caveats = (f"the decorrelation time is not known: runs were merged over {merge_s:g} s",)
 
     def counted(kind: EventKind, limit: float, merge_s: float) -> Events:
         runs = tally.mi.whole() if kind == "mi" else tally.at_limit(kind, limit)
@@ -210,17 +271,21 @@ def _evaluation(
         return find_events(runs, interval_ns=interval_ns, merge_s=merge_s, minimum_s=minimum)
 
     def rate(kind: EventKind, limit: float) -> RateEvidence:
-        events = counted(kind, limit, settings.merge_s)
+        events = counted(kind, limit, merge_s)
         return rate_evidence(
             kind,
             limit,
             events=len(events),
             runs=len(tally.mi.whole() if kind == "mi" else tally.at_limit(kind, limit)),
             event_hours=float(events.duration_s.sum()) / 3600,
-            merge_hours=settings.merge_s / 3600,
+            merge_hours=merge_s / 3600,
             judged_hours=(exposure.error_hours if kind == "exceeds_al" else exposure.judged_hours),
             confidence=settings.confidence,
             lower_bound=lower_bound,
+            modelled=modelled_event_rate(
+                kind, limit, process=process, levels=levels, confidence=settings.confidence
+            ),
+            caveats=caveats,
         )
 
     limits = []
@@ -232,6 +297,7 @@ def _evaluation(
             down_ns=tally.down_ns[al],
             interval_ns=interval_ns,
             confidence=settings.confidence,
+            tau_s=process.tau_upper_s,
         )
         if truth is None:
             limits.append(AlertLimitResult(al, up, None, {}, {}))
@@ -274,4 +340,6 @@ def _evaluation(
         curves=curves,
         strips=tally.strips,
         scatter=tally.scatter,
+        levels=levels,
+        process=process,
     )

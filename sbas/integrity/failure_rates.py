@@ -54,7 +54,7 @@ def failure_rate(
     event: EventKind = "hmi",
     target_per_h: float | None = None,
     time_to_alert_s: float = EvaluationSettings.time_to_alert_s,
-    merge_s: float = EvaluationSettings.merge_s,
+    merge_s: float | None = EvaluationSettings.merge_s,
     accept_findings: Iterable[str] = (),
     progress: Progress | None = None,
 ) -> FailureRate:

@@ -25,9 +25,6 @@ NPA_CLAIM = Estimate(
 )  # fmt: skip
 """Integrity risk allocated to the SBAS non-precision approach service, faulted and fault-free."""
 
-NOT_MODELLED = Refusal(
-    "no tail model is fitted in this version", "use the demonstrated bound, or record longer"
-)
 _NO_CLAIM = Refusal("no allocation covers errors regardless of the protection level")
 _LOWER_BOUND = Refusal(
     "not demonstrated: errors against the recording's own median are only a lower bound",
@@ -84,6 +81,8 @@ def rate_evidence(
     merge_hours: float,
     confidence: float,
     lower_bound: bool,
+    modelled: Estimate | Refusal,
+    caveats: tuple[str, ...] = (),
 ) -> RateEvidence:
     """The evidence for a rate from counted events.
 
@@ -98,6 +97,8 @@ def rate_evidence(
     merge_hours : merge time of the events [h].
     confidence : of the one-sided upper bound.
     lower_bound : True where errors were formed against the recording's own median.
+    modelled : the rate by a fitted tail, or why there is none.
+    caveats : sentences that must travel with the demonstrated rate.
     """
     demonstrated: Estimate | Refusal
     hours = max(judged_hours - event_hours - events * merge_hours, 0.0)
@@ -108,8 +109,8 @@ def rate_evidence(
     else:
         demonstrated = poisson_bounds(events, hours, confidence)
         if runs > 2 * events:
-            caveat = f"{runs} runs of bad epochs were merged into {events} events"
-            demonstrated = replace(demonstrated, caveats=(*demonstrated.caveats, caveat))
+            caveats = (*caveats, f"{runs} runs of bad epochs were merged into {events} events")
+        demonstrated = replace(demonstrated, caveats=(*demonstrated.caveats, *caveats))
     claimed = _NO_CLAIM if event == "exceeds_al" else NPA_CLAIM
     return RateEvidence(
         event=event,
@@ -119,6 +120,6 @@ def rate_evidence(
         event_hours=event_hours,
         hours=hours,
         demonstrated=demonstrated,
-        modelled=NOT_MODELLED,
+        modelled=modelled,
         claimed=claimed,
     )

@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sbas.estimate import Refusal
 from sbas.exceptions import InputError
 from sbas.findings import Finding
 from sbas.input_check import CheckResult
 from sbas.integrity.availability import Availability
 from sbas.integrity.counting import checked_alpha
+from sbas.integrity.error_process import ErrorProcess
 from sbas.integrity.events import Events
+from sbas.integrity.level_counts import LevelCounts
 from sbas.integrity.rate_evidence import EventKind, RateEvidence
 from sbas.numerals import key
 from sbas.recording import RecordingMeta
 from sbas.streaming import DensityGrid, Distribution, ThinnedSeries
 from sbas.timescales import NS_PER_S
 from sbas.truth import Truth
+
+if TYPE_CHECKING:
+    from sbas.integrity.railway_judgement import RailwayJudgement
 
 
 @dataclass(frozen=True)
@@ -33,9 +40,9 @@ class EvaluationSettings:
     alert_limits_m : horizontal alert limits [m].
     time_to_alert_s : an HMI event lasts at least this [s]; 10 s is NPA's, 6 s PA's
         (Navipedia, EGNOS Performances).
-    merge_s : runs closer than this are one event of a rate [s]: the floor of the convention
-        max(tau/2, 60 s), since no decorrelation time is measured here. Runs are merged before
-        the time to alert is asked of them, so that flicker counts as one lasting event.
+    merge_s : runs closer than this are one event of a rate [s]; None is max(tau/2, 60 s) of the
+        measured decorrelation time. Runs are merged before the time to alert is asked of them,
+        so that flicker counts as one lasting event.
     reset_s : merge time of the event list: what the user system needs to be reset [s].
     confidence : of every one-sided bound.
     accept : finding codes that the user accepts.
@@ -43,7 +50,7 @@ class EvaluationSettings:
 
     alert_limits_m: tuple[float, ...] = (50.0, 25.0, 20.0)
     time_to_alert_s: float = 10.0
-    merge_s: float = 60.0
+    merge_s: float | None = None
     reset_s: float = 0.0
     confidence: float = 0.95
     accept: tuple[str, ...] = ()
@@ -59,8 +66,9 @@ class EvaluationSettings:
         if len(set(limits)) < len(limits):
             raise InputError("an alert limit is given twice", evidence=f"got {limits}")
         for name in ("time_to_alert_s", "merge_s", "reset_s"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise InputError(f"{name} must be 0 s or more", evidence=f"{getattr(self, name)}")
+            value = getattr(self, name)
+            if value is not None and not 0 <= value < math.inf:
+                raise InputError(f"{name} must be 0 s or more", evidence=f"{value}")
         checked_alpha(self.confidence)
 
 
@@ -173,6 +181,20 @@ class Evaluation:
     curves: Curves
     strips: ThinnedSeries
     scatter: DensityGrid
+    levels: LevelCounts
+    process: ErrorProcess
+
+    @property
+    def merge_s(self) -> float:
+        """Merge time of the events of rates [s]: as set, else from the decorrelation time."""
+        return self.process.merge_s if self.settings.merge_s is None else self.settings.merge_s
+
+    @cached_property
+    def railway(self) -> RailwayJudgement | Refusal:
+        """What K the measured errors need for 5e-8 per hour, and the verdict on 6.18."""
+        from sbas.integrity.railway_judgement import railway_judgement  # it reads this class
+
+        return railway_judgement(self)
 
     @property
     def errors_are_lower_bound(self) -> bool:
@@ -202,6 +224,10 @@ class Evaluation:
             "modes": self.modes,
             "exposure": dict(vars(self.exposure)),
             "settings": dict(vars(self.settings)),
+            "merge_s": self.merge_s,
+            "decorrelation": self.process.decorrelation.to_dict(),
+            "sigma_ratio": self.process.sigma_ratio,
+            "railway": self.railway.to_dict(),
             "alert_limits": {key(r.alert_limit_m): _limit_dict(r) for r in self.alert_limits},
             "findings": [f.to_dict() for f in self.findings],
             "sources": [dict(vars(s)) for s in self.meta.sources],
@@ -217,6 +243,7 @@ class Evaluation:
                 "hours": rate.hours,
                 "upper_per_h": getattr(rate.demonstrated, "upper", None),
                 "demonstrated": str(rate.demonstrated),
+                "modelled": str(rate.modelled),
                 "availability": limit.availability.availability.value,
             }
             for limit in self.alert_limits

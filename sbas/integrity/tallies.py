@@ -8,7 +8,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sbas.estimate import Refusal
+from sbas.integrity.correlation.error_grid import GridFiller, grid_cells
+from sbas.integrity.epoch_levels import mode_codes
 from sbas.integrity.events import Runs, Stretch, find_runs, join_runs
+from sbas.integrity.level_counts import LevelCounter
 from sbas.integrity.position_error import position_errors
 from sbas.integrity.rate_evidence import EventKind
 from sbas.integrity.stanford import REGIONS, stanford_regions
@@ -93,10 +97,20 @@ class RecordTally:
         self._level_counts = np.zeros(len(LEVEL_GRID_M) + 1, np.int64)
         self._ratio_counts = np.zeros(self.RATIO_GRID.size + 1, np.int64)
         self._sums = np.zeros(5)
+        self.levels = LevelCounter()
+        self.grid = self._grid(survey)
         self.strips = ThinnedSeries(survey.begin_ns, survey.end_ns, STRIPS, STRIP_BINS)
         self.scatter = DensityGrid()
         self.stanford_cell_m = 1.2 * max(alert_limits_m) / STANFORD_BINS
         self.stanford = np.zeros((STANFORD_BINS, STANFORD_BINS), np.int64)
+
+    def _grid(self, survey: Survey) -> GridFiller | Refusal:
+        if self.truth is None:
+            return Refusal("without truth no error is formed", "--truth LAT,LON,HEIGHT")
+        if survey.repeated or survey.backward:
+            return Refusal("times are repeated or run backward", "sort, or drop what is repeated")
+        cells = grid_cells(survey)
+        return cells if isinstance(cells, Refusal) else GridFiller(survey, cells, levels=True)
 
     def update(self, batch: pd.DataFrame) -> None:
         """Count a batch with `COLUMNS`, whose times follow all earlier ones."""
@@ -113,7 +127,8 @@ class RecordTally:
         self.levels_left_out += int(np.sum(left_out & ~np.isnan(batch["hpl_m"].to_numpy())))
         self.hpl.update(hpl)
         self.vpl.update(vpl)
-        codes = batch["mode"].cat.codes.to_numpy()
+        codes = mode_codes(batch)
+        self.levels.update(hpl, codes)
         # A missing mode has code -1, which the modulus turns into the last name, unknown.
         for name, count in zip(self.modes, np.bincount(codes % len(self.modes)), strict=False):
             self.modes[name] += int(count)
@@ -131,7 +146,7 @@ class RecordTally:
         self.level_ns += int(covers[np.isfinite(hpl)].sum())
         hpe = np.full(n, np.nan)
         if self.truth is not None:
-            hpe = self._update_errors(batch, hpl, stretch, covers)
+            hpe = self._update_errors(batch, hpl, codes, stretch, covers)
         n_sv = batch["n_sv"].to_numpy().astype(float)
         sigmas = (batch[name].to_numpy() for name in ("sigma_e_m", "sigma_n_m", "cov_en_m2"))
         self.strips.update(
@@ -153,7 +168,12 @@ class RecordTally:
         return np.minimum(np.diff(time_ns, prepend=first), self.interval_ns)
 
     def _update_errors(
-        self, batch: pd.DataFrame, hpl: Floats, stretch: Stretch, covers: Ints
+        self,
+        batch: pd.DataFrame,
+        hpl: Floats,
+        codes: NDArray[np.int8],
+        stretch: Stretch,
+        covers: Ints,
     ) -> Floats:
         assert self.truth is not None
         errors = position_errors(batch, self.truth)
@@ -168,6 +188,8 @@ class RecordTally:
         e, n = east[formed], north[formed]
         self._sums += [e.sum(), n.sum(), e @ e, n @ n, e @ n]
         self.scatter.update(east, north)
+        if isinstance(self.grid, GridFiller):
+            self.grid.fill(stretch.time_ns, np.stack([east, north]), hpl_m=hpl, modes=codes)
         judged = formed & np.isfinite(hpl)
         self.judged += int(judged.sum())
         self.judged_ns += int(covers[judged].sum())
@@ -202,8 +224,10 @@ class RecordTally:
         for name in ("epochs", "positions", "judged", "mi_epochs", "levels_left_out", "covered_ns",
                      "judged_ns", "error_ns", "level_ns"):  # fmt: skip
             setattr(self, name, getattr(self, name) + getattr(other, name))
-        for name in ("hpe", "vpe", "hpl", "vpl", "mi", "strips", "scatter"):
+        for name in ("hpe", "vpe", "hpl", "vpl", "mi", "strips", "scatter", "levels"):
             getattr(self, name).merge(getattr(other, name))
+        if isinstance(self.grid, GridFiller) and isinstance(other.grid, GridFiller):
+            self.grid.merge(other.grid)
         self.truth_sigma_h_m = max(self.truth_sigma_h_m, other.truth_sigma_h_m)
         for mode, count in other.modes.items():
             self.modes[mode] += count

@@ -4,6 +4,7 @@ from sbas.plots.autocorrelation_picture import decorrelation_curve
 from sbas.plots.availability_against_limit import availability_curve
 from sbas.plots.comparison_picture import pair_strips
 from sbas.plots.error_scatter import scatter
+from sbas.plots.k_against_tau_picture import k_curve
 from sbas.plots.rates_against_limit import rate_curve
 from sbas.plots.ratio_survival import survival
 from sbas.plots.recording_strips import strips
@@ -13,6 +14,7 @@ from sbas.plots.tail_picture import tail_plot, threshold_stability
 __all__ = [
     "availability_curve",
     "decorrelation_curve",
+    "k_curve",
     "pair_strips",
     "rate_curve",
     "scatter",

@@ -1,7 +1,9 @@
-"""What rate is demonstrated against the alert limit, beside what is claimed and what SIL needs."""
+"""Rates against the alert limit: demonstrated, modelled, claimed, and what SIL needs."""
 
 from __future__ import annotations
 
+import math
+import sys
 from typing import TYPE_CHECKING
 
 from sbas.estimate import Estimate, Refusal
@@ -26,7 +28,10 @@ from sbas.plots.style import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SHEET = Sheet(FULL_WIDTH, 3.6, left=0.58, right=0.5, bottom=0.85)
+SHEET = Sheet(FULL_WIDTH, 3.75, left=0.58, right=0.5, bottom=1.0)
+
+_LOWEST_PER_H, _LOWEST_MODELLED_PER_H = 3e-10, 1e-12
+"""Foot of the axis, and how far modelled rates may lower it."""
 
 _DRAWN: tuple[tuple[EventKind, str, str], ...] = (
     ("exceeds_al", BLUE, "HPE ≥ AL"),
@@ -35,14 +40,15 @@ _DRAWN: tuple[tuple[EventKind, str, str], ...] = (
 
 
 def rate_curve(evaluation: Evaluation, *, ax: Axes | None = None) -> Axes:
-    """Demonstrated and claimed rates of events per hour against the alert limit, both axes log.
+    """Demonstrated, modelled and claimed rates of events per hour against the alert limit.
 
     Parameters
     ----------
     evaluation : result of `sbas.evaluate`.
     ax : axes to draw on; a new figure without them. Triangles are one-sided upper bounds,
-        circles the counted rates where events were seen. Where no rate can be given, the
-        picture says why.
+        circles the counted rates where events were seen; diamonds on broken lines are modelled
+        rates, thin dotted lines their upper bounds. Where no rate is demonstrated, the picture
+        says why; where none is modelled, nothing is drawn of it.
 
     References
     ----------
@@ -57,7 +63,10 @@ def rate_curve(evaluation: Evaluation, *, ax: Axes | None = None) -> Axes:
         bounds = [e.upper for e in given if isinstance(e, Estimate) and e.upper is not None]
         limits = [*settings.alert_limits_m, *CURVE_LIMITS_M]
         log_axis(ax, "x", min(limits) * 0.85, max(limits) * 1.2)
-        log_axis(ax, "y", 3e-10, max([10.0, *(3 * b for b in bounds)]))
+        drawn = (r.modelled for kind, _, _ in _DRAWN for r in rates[kind])
+        tails = [e for e in drawn if isinstance(e, Estimate)]
+        bounds += [e.value if e.upper is None else e.upper for e in tails]
+        log_axis(ax, "y", _foot(tails), max([10.0, *(3 * b for b in bounds)]))
         _bands(ax)
         for limit in settings.alert_limits_m:
             ax.axvline(limit, color=INK, linewidth=0.6, linestyle=(0, (4, 2)))
@@ -65,6 +74,8 @@ def rate_curve(evaluation: Evaluation, *, ax: Axes | None = None) -> Axes:
             # Where both agree, the smaller mark of the worse event lies on the larger one.
             size = 4.0 if kind == "hmi" else 6.5
             _points(ax, rates[kind], colour, name, settings.confidence, size)
+        for kind, colour, name in _DRAWN:
+            _modelled(ax, rates[kind], colour, name)
         claims = [r.claimed for r in rates["hmi"] if isinstance(r.claimed, Estimate)]
         for claim in dict.fromkeys(claims or [NPA_CLAIM]):
             ax.axhline(
@@ -102,6 +113,32 @@ def _points(
             *zip(*seen, strict=True), "o", color=colour, markerfacecolor="white", markersize=size,
             label=f"demonstrated: {name}, counted rate",
         )  # fmt: skip
+
+
+def _foot(tails: list[Estimate]) -> float:
+    """Foot of the rate axis [1/h]: lower only where modelled rates lie there."""
+    lowest = min((e.value / 3 for e in tails), default=_LOWEST_PER_H)
+    return min(_LOWEST_PER_H, max(lowest, _LOWEST_MODELLED_PER_H))
+
+
+def _modelled(ax: Axes, rates: tuple[RateEvidence, ...], colour: str, name: str) -> None:
+    given = [e if isinstance(e := r.modelled, Estimate) else None for r in rates]
+    if not any(given):
+        return
+    limits = [r.alert_limit_m for r in rates]
+    label = f"modelled: {name}, rate"
+    bounded = [e for e in given if e is not None and e.upper is not None]
+    if bounded:
+        upper = [math.nan if e is None or e.upper is None else e.upper for e in given]
+        ax.plot(limits, upper, color=colour, linewidth=0.8, linestyle=(0, (1, 1)))
+        label += f" (dotted: upper bound at {percent(bounded[0].confidence or 0.0)})"
+    # A rate too small for a double still lies below the axis: its line must lead there. Where
+    # a limit is refused the line is broken.
+    values = [math.nan if e is None else max(e.value, sys.float_info.min) for e in given]
+    ax.plot(
+        limits, values, "D", color=colour, markerfacecolor="white", markersize=3.5,
+        linestyle=(0, (5, 2)), linewidth=0.9, label=label,
+    )  # fmt: skip
 
 
 def _bands(ax: Axes) -> None:

@@ -7,16 +7,21 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
 
+from sbas.estimate import Refusal
 from sbas.exceptions import InputError
+from sbas.integrity.causes.causes import Causes
 from sbas.integrity.results import Evaluation
 from sbas.numerals import count, hours, stamp
 from sbas.reporting.content import Section
 from sbas.reporting.sections import (
+    decorrelation_and_k,
+    error_tail,
     event_list,
     exposure_hours,
     glossary,
     input_files,
     input_findings,
+    likely_causes,
     method_trace,
     parameters,
     pictures,
@@ -28,6 +33,8 @@ _SECTIONS = (
     verdict.section,
     results.section,
     pictures.section,
+    decorrelation_and_k.section,
+    error_tail.section,
     exposure_hours.section,
     input_files.section,
     input_findings.section,
@@ -36,6 +43,8 @@ _SECTIONS = (
     method_trace.section,
     glossary.section,
 )
+
+NOT_EXPLAINED = Refusal("sbas.explain was not asked", "sbas.report(..., causes=sbas.explain(...))")
 
 
 @dataclass(frozen=True)
@@ -55,7 +64,7 @@ class Report:
         }
 
 
-def report_of(evaluation: Evaluation) -> Report:
+def report_of(evaluation: Evaluation, *, causes: Causes | Refusal = NOT_EXPLAINED) -> Report:
     """The report of an evaluation as data, pictures drawn."""
     names = [PurePath(source.path).name or source.path for source in evaluation.meta.sources]
     title = ", ".join(names[:2]) or "recording without a file"
@@ -66,7 +75,10 @@ def report_of(evaluation: Evaluation) -> Report:
         f"{count(evaluation.epochs)} epochs, {hours(evaluation.hours)} recorded, "
         f"{stamp(survey.begin_ns)} to {stamp(survey.end_ns)} GPST"
     )
-    return Report(title, subtitle, tuple(section(evaluation) for section in _SECTIONS))
+    sections = [section(evaluation) for section in _SECTIONS]
+    after_events = 1 + next(i for i, s in enumerate(sections) if s.key == "events")
+    sections.insert(after_events, likely_causes.section(causes))
+    return Report(title, subtitle, tuple(sections))
 
 
 def render_html(document: Report) -> str:
@@ -84,13 +96,19 @@ def render_html(document: Report) -> str:
     return environment.get_template("report.html").render(report=document)
 
 
-def report(evaluation: Evaluation, path: str | os.PathLike[str]) -> Path:
+def report(
+    evaluation: Evaluation,
+    path: str | os.PathLike[str],
+    *,
+    causes: Causes | Refusal = NOT_EXPLAINED,
+) -> Path:
     """Write the report of an evaluation as one self-contained HTML file.
 
     Parameters
     ----------
     evaluation : result of `sbas.evaluate`.
     path : the file to write; one that exists is replaced.
+    causes : result of `sbas.explain` for the same recording.
 
     Returns
     -------
@@ -101,7 +119,7 @@ def report(evaluation: Evaluation, path: str | os.PathLike[str]) -> Path:
     InputError : the file cannot be written.
     """
     target = Path(path)
-    page = render_html(report_of(evaluation))
+    page = render_html(report_of(evaluation, causes=causes))
     try:
         target.write_text(page, encoding="utf-8", errors="backslashreplace", newline="\n")
     except OSError as error:

@@ -16,7 +16,13 @@ def of_seconds(down: Runs, gaps: Gaps) -> Availability:
     """Availability of a 1 Hz record."""
     rows = int(np.sum(down.last - down.first + 1))
     return availability(
-        down, gaps, up_ns=(down.rows - rows) * S, down_ns=rows * S, interval_ns=S, confidence=0.95
+        down,
+        gaps,
+        up_ns=(down.rows - rows) * S,
+        down_ns=rows * S,
+        interval_ns=S,
+        confidence=0.95,
+        tau_s=None,
     )
 
 
@@ -79,3 +85,35 @@ def test_a_gap_within_down_time_is_one_loss() -> None:
     gaps = Gaps(np.array([3]), np.array([2 * S]), np.array([10 * S]))
     result = of_seconds(runs, gaps)
     assert (result.losses, result.recoveries) == (1, 1)
+
+
+def test_never_down_is_bounded_by_the_effective_samples_of_the_record() -> None:
+    # Clopper-Pearson with no failure in n = T/tau: lower limit alpha^(1/n), exact.
+    first, stop, rows = np.empty(0, np.int64), np.empty(0, np.int64), 36_000
+    stretch = Stretch(np.arange(rows) * S, int(1.5 * S))
+    gaps = Gaps(first, stop, stop)
+    runs = find_runs(first, stretch)
+    found = availability(
+        runs, gaps, up_ns=rows * S, down_ns=0, interval_ns=S, confidence=0.95, tau_s=360.0
+    )
+    for share in (found.availability, found.availability_excluding_gaps):
+        assert share.value == 1.0
+        assert share.lower == pytest.approx(0.05 ** (1 / 100), rel=1e-12)
+        assert share.evidence == "demonstrated"
+
+
+def test_gaps_lower_the_bound_that_counts_them_as_down() -> None:
+    time = np.arange(36_000) * S
+    time[20_000:] += 3600 * S
+    stretch = Stretch(time, int(1.5 * S))
+    gaps = Gaps(np.array([20_000]), time[19_999:20_000], time[20_000:20_001])
+    runs = find_runs(np.arange(500, 530), stretch)
+    found = availability(
+        runs, gaps, up_ns=35_970 * S, down_ns=30 * S, interval_ns=S, confidence=0.95, tau_s=60.0
+    )
+    whole, without = found.availability, found.availability_excluding_gaps
+    assert whole.value == pytest.approx(35_970 / 39_600, rel=1e-12)
+    assert without.value == pytest.approx(35_970 / 36_000, rel=1e-12)
+    assert whole.lower is not None
+    assert without.lower is not None
+    assert whole.lower < whole.value < without.lower < without.value

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import matplotlib
@@ -12,10 +14,15 @@ import pytest
 from matplotlib.figure import Figure
 
 import sbas.plots
+from sbas.estimate import Estimate, Fitted, Refusal
 from sbas.integrity.evaluation import evaluate
+from sbas.integrity.rate_evidence import EventKind
+from sbas.integrity.results import Evaluation
 from tests.plots.synthetic import KINDS, TRUTH, evaluated, synthetic_recording
 
-OF_OTHER_RESULTS = {"decorrelation_curve", "pair_strips", "tail_plot", "threshold_stability"}
+OF_OTHER_RESULTS = {
+    "decorrelation_curve", "k_curve", "pair_strips", "tail_plot", "threshold_stability",
+}  # fmt: skip
 """Drawn from results of their own; tested beside them."""
 PICTURES = [name for name in sbas.plots.__all__ if name not in OF_OTHER_RESULTS]
 
@@ -124,6 +131,69 @@ def test_the_drawn_bound_is_garwoods() -> None:
     bound = lines["demonstrated: HMI, upper bound at 95 %"]
     assert bound.get_ydata()[-1] == pytest.approx(-np.log(0.05) * 1.2, rel=1e-12)
     assert any(label.startswith("claimed: 1e-07/h") for label in lines)
+
+
+def _with_modelled(modelled: Callable[[EventKind, float], Estimate | Refusal]) -> Evaluation:
+    evaluation = evaluated("ordinary")
+    rates = {
+        kind: tuple(replace(r, modelled=modelled(kind, r.alert_limit_m)) for r in of_kind)
+        for kind, of_kind in evaluation.curves.rates.items()
+    }
+    return replace(evaluation, curves=replace(evaluation.curves, rates=rates))
+
+
+def _tail_rate(rate_per_h: float, *, upper: float | None = None) -> Estimate:
+    basis = Fitted("exponential tail", {"scale": 1.0}, 5.4)
+    confidence = None if upper is None else 0.95
+    return Estimate(rate_per_h, None, upper, confidence, "per_h", basis)
+
+
+def test_modelled_rates_are_drawn_apart_from_demonstrated_ones() -> None:
+    def modelled(kind: EventKind, limit: float) -> Estimate | Refusal:
+        if kind == "hmi" or limit == 50:
+            return Refusal("the tail is not Gaussian")
+        return _tail_rate(1e-4 / limit, upper=1e-3 / limit)
+
+    evaluation = _with_modelled(modelled)
+    ax = sbas.plots.rate_curve(evaluation)
+    plain = sbas.plots.rate_curve(_with_modelled(lambda kind, limit: Refusal("no tail")))
+    lines = {str(line.get_label()): line for line in ax.get_lines()}
+    (label,) = [name for name in lines if name.startswith("modelled")]
+    assert label == "modelled: HPE ≥ AL, rate (dotted: upper bound at 95 %)"
+    limits, rates = (np.asarray(a, float) for a in lines[label].get_data())
+    assert np.isnan(rates[limits == 50]).tolist() == [True]
+    known = limits != 50
+    np.testing.assert_allclose(rates[known], 1e-4 / limits[known])
+    (bound,) = [
+        line for line in ax.get_lines()
+        if line.get_label().startswith("_") and np.size(line.get_xdata()) == limits.size
+    ]  # fmt: skip
+    np.testing.assert_allclose(bound.get_ydata()[known], 1e-3 / limits[known])
+    # Neither the axis nor the demonstrated figures change where nothing lies below.
+    assert ax.get_ylim() == plain.get_ylim()
+    for line in plain.get_lines():
+        if str(line.get_label()).startswith("demonstrated"):
+            np.testing.assert_array_equal(line.get_ydata(), lines[line.get_label()].get_ydata())
+
+
+@pytest.mark.parametrize(("rate", "foot"), [(3e-11, 1e-11), (1e-30, 1e-12), (0.0, 1e-12)])
+def test_modelled_rates_lower_the_axis_to_1e_12_at_most(rate: float, foot: float) -> None:
+    def modelled(kind: EventKind, limit: float) -> Estimate | Refusal:
+        return _tail_rate(rate if limit > 30 else 1e-6)
+
+    ax = sbas.plots.rate_curve(_with_modelled(modelled))
+    assert ax.get_ylim()[0] == pytest.approx(foot)
+    ax.figure.canvas.draw()
+    labels = [t.get_text() for t in ax.get_legend().get_texts()]
+    assert {"modelled: HMI, rate", "modelled: HPE ≥ AL, rate"} <= set(labels)
+    bands = {t.get_text() for t in ax.texts}
+    assert {"SIL 1", "SIL 2", "SIL 3", "SIL 4"} <= bands
+
+
+def test_nothing_is_drawn_of_what_is_modelled_nowhere() -> None:
+    ax = sbas.plots.rate_curve(_with_modelled(lambda kind, limit: Refusal("no tail")))
+    assert not any(str(line.get_label()).startswith("modelled") for line in ax.get_lines())
+    assert not any("no tail" in t.get_text() for t in ax.texts)
 
 
 def test_the_ellipse_of_95_percent_has_the_rayleigh_factor() -> None:

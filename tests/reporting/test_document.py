@@ -13,11 +13,13 @@ from typing import Any
 
 import pytest
 
+import sbas
 from sbas.estimate import Refusal
 from sbas.exceptions import InputError
 from sbas.integrity.counting import poisson_bounds
 from sbas.integrity.evaluation import evaluate
 from sbas.integrity.results import Evaluation
+from sbas.integrity.tails.tail_fit import TailFit
 from sbas.reporting import render_html, report, report_of
 from sbas.reporting.sections import event_list
 from sbas.reporting.sections.method_trace import METHODS
@@ -75,7 +77,9 @@ def test_refers_to_nothing_outside(kind: str, tmp_path: Path) -> None:
     assert not {"script", "link", "iframe", "object"} & set(seen.tags)
     assert len(set(seen.ids)) == len(seen.ids)
     assert {link[1:] for link in seen.links if link.startswith("#")} <= set(seen.ids)
-    assert page.count('role="img"') == 6
+    # Two of the tail exist only where one was fitted.
+    fitted = isinstance(evaluated(kind).process.tail, TailFit)
+    assert page.count('role="img"') == 8 + 2 * fitted
     assert len(page) < 1_500_000
 
 
@@ -224,3 +228,61 @@ def test_inputs_name_digest_and_size() -> None:
 def test_a_folder_that_is_not_there_is_bad_input(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
         report(evaluated("two_epochs"), tmp_path / "absent" / "report.html")
+
+
+def _section(document: Any, key: str) -> Any:
+    return next(s for s in document.sections if s.key == key)
+
+
+def test_the_verdict_on_the_published_k_is_that_of_the_evaluation() -> None:
+    evaluation = evaluate(synthetic_recording(60_000), truth=TRUTH)
+    judged = evaluation.railway
+    assert not isinstance(judged, Refusal)
+    section = _section(report_of(evaluation), "decorrelation")
+    said = " ".join(section.callouts[0].paragraphs)
+    assert judged.as_claimed.verdict in said
+    assert evaluation.process.decorrelation.interval_text in said
+    tables = {t.title: t for t in section.tables}
+    (k_table,) = (t for title, t in tables.items() if title.startswith("K factor for"))
+    printed = {row[0].text: float(row[1].text) for row in k_table.rows}
+    assert printed == {name: round(m.k, 4) for name, m in judged.models.models.items()}
+    (levels,) = (t for title, t in tables.items() if "railway HPL" in title)
+    assert [row[0].text for row in levels.rows] == ["50", "25", "20"]
+
+
+def test_a_short_record_says_that_it_cannot_tell() -> None:
+    section = _section(report_of(evaluated("ordinary")), "decorrelation")
+    said = " ".join(section.callouts[0].paragraphs)
+    assert "too short to confirm or reject 360 s" in said
+    assert "cannot be told" in said
+
+
+def test_modelled_rates_and_their_bounds_are_printed_or_refused_in_words() -> None:
+    evaluation = evaluate(synthetic_recording(60_000), truth=TRUTH, alert_limits_m=(10.0,))
+    (rates,) = (t for t in _section(report_of(evaluation), "figures").tables if "Rates" in t.title)
+    upper = [c.title for c in rates.columns].index("Modelled: upper bound at 95 % [1/h]")
+    kinds = {row[1].text: row[upper].text for row in rates.rows}
+    modelled = evaluation.at(10.0).rates["exceeds_al"].modelled
+    if isinstance(modelled, Refusal):
+        assert kinds["HPE ≥ AL"] == "not given"
+        assert any(modelled.reason in note for note in rates.notes)
+    else:
+        assert kinds["HPE ≥ AL"] != "not given"
+    tail = _section(report_of(evaluation), "tail")
+    fitted = evaluation.process.tail
+    refusal = fitted if isinstance(fitted, Refusal) else fitted.refusal
+    assert (tail.callouts[0].title == "No rate is modelled") == (refusal is not None)
+
+
+def test_likely_causes_are_listed_the_worst_first() -> None:
+    recording = synthetic_recording(spikes={1500: 100.0, 2000: 60.0})
+    causes = sbas.explain(recording, truth=TRUTH)
+    assert len(causes.events) == 2
+    document = report_of(evaluate(recording, truth=TRUTH), causes=causes)
+    section = _section(document, "causes")
+    counts, events = section.tables
+    assert sum(int(row[2].text) for row in counts.rows) == 2
+    ratios = [float(row[4].text) for row in events.rows]
+    assert ratios == sorted(ratios, reverse=True)
+    alone = _section(report_of(evaluated("ordinary")), "causes")
+    assert "Not explained" in alone.paragraphs[0]

@@ -18,7 +18,7 @@ from sbas.input_check import accept, check
 from sbas.integrity.causes.cause_checks import CAUSES, Cause, explain_misleading, explain_spike
 from sbas.integrity.causes.event_context import Context, EpochArrays, rise_begins
 from sbas.integrity.causes.running_level import running_level
-from sbas.integrity.comparison.epoch_levels import k_of_epochs, mode_codes, whole_table
+from sbas.integrity.epoch_levels import k_of_epochs, mode_codes, whole_table
 from sbas.integrity.events import Events, Stretch, find_events, find_runs
 from sbas.integrity.exposure.exposure import require
 from sbas.integrity.position_error import position_errors

@@ -13,7 +13,6 @@ from sbas.estimate import Estimate, Refusal
 from sbas.exceptions import InputError
 from sbas.findings import Finding, refuse_on_errors
 from sbas.input_check import CheckResult, accept, check
-from sbas.integrity.comparison.block_bootstrap import merge_time_s, quantile_estimate
 from sbas.integrity.comparison.comparison_results import (
     PAPER_TAU_S,
     Comparison,
@@ -24,12 +23,6 @@ from sbas.integrity.comparison.comparison_results import (
     Spread,
 )
 from sbas.integrity.comparison.comparison_words import caveats_of, verdict_of
-from sbas.integrity.comparison.epoch_levels import (
-    k_of_epochs,
-    mode_codes,
-    usable_hpl_m,
-    whole_table,
-)
 from sbas.integrity.comparison.mode_losses import pa_drop_outs
 from sbas.integrity.comparison.paired_availability import (
     availability_comparison,
@@ -42,9 +35,16 @@ from sbas.integrity.comparison.paired_differences import (
 )
 from sbas.integrity.comparison.pairing import CommonEpochs, common_epochs
 from sbas.integrity.counting import checked_alpha
+from sbas.integrity.epoch_levels import (
+    k_of_epochs,
+    mode_codes,
+    usable_hpl_m,
+    whole_table,
+)
 from sbas.integrity.exposure.exposure import require
 from sbas.integrity.position_error import position_errors
 from sbas.integrity.results import EvaluationSettings
+from sbas.integrity.shares.block_bootstrap import merge_time_s, quantile_estimate
 from sbas.recording import MODES, EpochSource
 from sbas.streaming import ThinnedSeries
 from sbas.timescales import NS_PER_S

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from sbas.integrity.comparison.comparison_results import DropOuts
-from sbas.integrity.comparison.epoch_levels import mode_codes
 from sbas.integrity.counting import poisson_bounds
+from sbas.integrity.epoch_levels import mode_codes
 from sbas.integrity.events import Stretch, find_events, find_runs
 from sbas.recording import MODES
 from sbas.recording_survey import GAP_STEPS

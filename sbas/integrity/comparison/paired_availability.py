@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbas.estimate import Estimate
-from sbas.integrity.comparison.block_bootstrap import merge_time_s, share_difference, share_estimate
 from sbas.integrity.comparison.comparison_results import AvailabilityComparison
 from sbas.integrity.comparison.pairing import CommonEpochs
-from sbas.integrity.comparison.time_spans import Spans, spans_of_runs
 from sbas.integrity.counting import poisson_bounds
 from sbas.integrity.events import Stretch, find_events, find_runs
+from sbas.integrity.shares.block_bootstrap import merge_time_s, share_difference, share_estimate
+from sbas.integrity.shares.time_spans import Spans, spans_of_runs
 from sbas.recording_survey import GAP_STEPS
 from sbas.timescales import NS_PER_S
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -103,6 +104,18 @@ class Decorrelation:
     pieces: tuple[Decorrelation, ...] = ()
 
     @property
+    def white_share(self) -> float:
+        """Largest white share of the variance that the first lag allows, beside tau.
+
+        1 - r(dt) exp(dt/tau), at least 0: what tau does not explain of the fall within one step.
+        It never takes an error for slower than it is, as the nugget of a fit can; 0 without tau.
+        """
+        if self.curve is None or isinstance(self.tau_s, Refusal) or self.step_s is None:
+            return 0.0
+        r1 = float(self.curve.r[1])
+        return min(max(0.0, 1 - r1 * math.exp(self.step_s / self.tau_s.value)), 0.99)
+
+    @property
     def verdict_on_360_s(self) -> Verdict:
         """Is the decorrelation time the 360 s that K = 6.18 supposes?"""
         low, high = self.tau_low_s, self.tau_high_s
@@ -159,6 +172,7 @@ class Decorrelation:
             "verdict_on_360_s": self.verdict_on_360_s,
             "verdict": self.verdict_text,
             "nugget": self.nugget,
+            "white_share": self.white_share,
             "short_lag_exponent": self.short_lag_exponent,
             "late_over_early": self.late_over_early,
             "two_processes": None if self.two_processes is None else self.two_processes.to_dict(),

@@ -7,6 +7,8 @@ lattice of true values; its quantiles are then read backwards.
 from __future__ import annotations
 
 import math
+import os
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -38,6 +40,7 @@ FEWEST, MOST = 500, 4000
 """Simulated records for one true value, within a budget of samples."""
 LONGEST_TRUE = 10.0
 """True values up to this many record lengths are tried; beyond, nothing changes any more."""
+MOST_THREADS = 4
 _NUGGETS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.65)
 """White shares that are simulated; one below 5 % cannot be told from chance."""
 
@@ -196,26 +199,50 @@ def _invert(
     tail = (1 - confidence) / 2
     # A quantile of so many draws has an error of its own: it is moved outward by one sigma of it.
     tail = max(tail - math.sqrt(tail * (1 - tail) / design.draws), 0.0)
-    curves: dict[int, Floats] = {}
-
-    def quantiles(j: int) -> Floats:
-        if j not in curves:
-            drawn = simulated_estimates(design, round(j * lattice, 12))
-            q = np.quantile(drawn, [tail, 0.5, 1 - tail], method="inverted_cdf")
-            if design.shrink < 1:
-                # A spread falls with the root of the length, a bias with the length.
-                true = j * lattice
-                q = true + (q[1] - true) * design.shrink**2 + (q - q[1]) * design.shrink
-            curves[j] = q
-        return curves[j]
-
     start = round(min(log_observed, math.log(design.length_s)) / lattice)
     least = math.ceil(math.log(design.step_s / 2) / lattice)
     most = math.floor(math.log(LONGEST_TRUE * known_s) / lattice)
+    _setups(design)  # once, before several threads ask for it
+    running: dict[int, Future[Floats]] = {}
+
+    def quantiles(j: int) -> Floats:
+        drawn = running[j].result()
+        q = np.quantile(drawn, [tail, 0.5, 1 - tail], method="inverted_cdf")
+        if design.shrink < 1:
+            # A spread falls with the root of the length, a bias with the length.
+            true = j * lattice
+            q = true + (q[1] - true) * design.shrink**2 + (q - q[1]) * design.shrink
+        return np.asarray(q)
+
+    def too_high(j: int) -> bool:
+        return j > least and not log_observed > quantiles(j)[2]
+
+    def too_low(j: int) -> bool:
+        return j < most and not log_observed < quantiles(j)[0]
+
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, MOST_THREADS)) as pool:
+
+        def ask(j: int) -> None:
+            running[j] = pool.submit(simulated_estimates, design, round(j * lattice, 12))
+
+        # Nodes are about a standard deviation apart: two on either side will be needed, and the
+        # outer ones, asked first, say whether a third is.
+        lowest, highest = max(start - 2, min(least, start)), min(start + 2, max(most, start))
+        for j in sorted(range(lowest, highest + 1), key=lambda j: -abs(j - start)):
+            ask(j)
+        further = True
+        while further:
+            further = False
+            if too_high(lowest):
+                lowest, further = lowest - 1, True
+                ask(lowest)
+            if too_low(highest):
+                highest, further = highest + 1, True
+                ask(highest)
     first = last = start
-    while first > least and not log_observed > quantiles(first)[2]:
+    while too_high(first):
         first -= 1
-    while last < most and not log_observed < quantiles(last)[0]:
+    while too_low(last):
         last += 1
     nodes = range(first, last + 1)
     q = np.array([quantiles(j) for j in nodes])
@@ -269,11 +296,9 @@ def simulated_estimates(design: Design, log_tau: float) -> Floats:
     rho = math.exp(-design.step_s / tau)
     innovation = math.sqrt(-math.expm1(-2 * design.step_s / tau))
     draws, n = design.draws, design.cells
-    lags = longest_lag(n, design.step_s)
-    # Only the fall to the fit's floor is read: longer lags matter where it comes late.
     rows = max(1, (1 << 19) // n)
     estimates = []
-    setups = [_setup(design, s, lags) for s in range(len(design.masks))]
+    setups = _setups(design)
     for batch, done in enumerate(range(0, draws, rows)):
         known, projection, pairs = setups[batch % len(setups)]
         count = min(rows, draws - done)
@@ -281,28 +306,44 @@ def simulated_estimates(design: Design, log_tau: float) -> Floats:
         noise[:, :, 0] /= innovation
         x = lfilter(np.array([innovation], np.float32), np.array([1, -rho], np.float32), noise)
         if design.cross:
-            x[1] = design.cross * x[0] + math.sqrt(1 - design.cross**2) * x[1]
+            x[1] *= math.sqrt(1 - design.cross**2)
+            x[1] += design.cross * x[0]
         if design.nugget:
-            white = generator.standard_normal(x.shape, dtype=np.float32)
-            x = math.sqrt(1 - design.nugget) * x + math.sqrt(design.nugget) * white
-        x[:, :, ~known] = 0.0
-        x -= (x @ projection.T) @ projection
+            generator.standard_normal(dtype=np.float32, out=noise)
+            noise *= math.sqrt(design.nugget)
+            x *= math.sqrt(1 - design.nugget)
+            x += noise
+        if not known.all():
+            x *= known
+        flat = x.reshape(2 * count, n)
+        # Not by @: the threads of a BLAS library wait busily, on the cores of the other nodes.
+        shares = np.einsum("bn,jn->bj", flat, projection)
+        flat -= np.einsum("bj,jn->bn", shares, projection)
         estimates.append(fit_exponentials(_mean_correlation(x, pairs), design.step_s).tau_s)
     return np.sort(np.log(np.concatenate(estimates)))
 
 
-def _setup(
-    design: Design, stretch: int, lags: int
-) -> tuple[Bools, NDArray[np.float32], NDArray[np.int64]]:
-    """Known cells, orthonormal regressors (0 where missing) and pairs of a stretch."""
-    known = design.mask(stretch)
-    rows = regressors(
-        np.arange(known.size), cells=known.size, step_s=design.step_s, periods_s=design.periods_s
-    )
-    basis, sizes, _ = np.linalg.svd((rows * known).T.astype(float), full_matrices=False)
-    basis = basis[:, sizes > 1e-5 * sizes[0]]
-    _, pairs = lagged_products(np.where(known, 1.0, np.nan)[None], lags)
-    return known, np.ascontiguousarray(basis.T, np.float32), pairs
+@lru_cache(maxsize=2)
+def _setups(
+    design: Design,
+) -> tuple[tuple[Bools, NDArray[np.float32], NDArray[np.int64]], ...]:
+    """Of each stretch: known cells, orthonormal regressors (0 where missing) and pairs."""
+    # Only the fall to the fit's floor is read: longer lags matter where it comes late.
+    lags = longest_lag(design.cells, design.step_s)
+    setups = []
+    for stretch in range(len(design.masks)):
+        known = design.mask(stretch)
+        rows = regressors(
+            np.arange(known.size),
+            cells=known.size,
+            step_s=design.step_s,
+            periods_s=design.periods_s,
+        )
+        basis, sizes, _ = np.linalg.svd((rows * known).T.astype(float), full_matrices=False)
+        basis = basis[:, sizes > 1e-5 * sizes[0]]
+        _, pairs = lagged_products(np.where(known, 1.0, np.nan)[None], lags)
+        setups.append((known, np.ascontiguousarray(basis.T, np.float32), pairs))
+    return tuple(setups)
 
 
 def _mean_correlation(x: NDArray[np.floating[Any]], pairs: NDArray[np.int64]) -> Floats:
@@ -314,8 +355,11 @@ def _mean_correlation(x: NDArray[np.floating[Any]], pairs: NDArray[np.int64]) ->
     spectrum = np.zeros((x.shape[1], size // 2 + 1), np.float32)
     for component in x:
         transformed = rfft(component, size)
-        power = transformed.real**2 + transformed.imag**2
-        spectrum += power / (component**2).sum(axis=1, keepdims=True)
+        transformed /= np.sqrt(np.einsum("bn,bn->b", component, component))[:, None]
+        parts = transformed.view(spectrum.dtype)
+        np.square(parts, out=parts)
+        spectrum += parts[:, ::2]
+        spectrum += parts[:, 1::2]
     enough = pairs >= max(LEAST_PAIRS * pairs[0], 1)
     scale = pairs[0] / (x.shape[0] * np.where(enough, pairs, 1))
     products = irfft(spectrum, size)[:, : lags + 1]

@@ -129,17 +129,23 @@ def extremal_index(k: float, *, correlation: float, dim: int = 2, nugget: float 
     Leadbetter 1983, Z. Wahrscheinlichkeitstheorie verw. Gebiete 65, 291.
     """
     _require_process(k, correlation, dim, nugget)
+    from scipy.linalg import cho_solve_banded, cholesky_banded
+
     chain = _chain(k, correlation, dim, nugget)
-    block = _block(correlation)
+    # (1 + shift) I - matrix is a Stieltjes matrix: its factors and solutions are sums of terms of
+    # one sign, right in every entry. The shift is small against the gap of the spectrum.
+    resolvent = -chain.band
+    resolvent[0] += 1 + 1e-3 * (1 - correlation) * (1 + correlation)
+    factor = cholesky_banded(resolvent, lower=True, check_finite=False)
     vector, hazard = chain.start, math.inf
     while True:
         before = hazard
-        for _ in range(block):
-            vector = chain.propagate(vector)
+        # The step settles low levels, where little survives it; the resolvent high ones.
+        vector = cho_solve_banded((factor, True), chain.propagate(vector), check_finite=False)
+        vector /= float(vector.max())
         hazard = float(chain.exit @ vector) / float(chain.start @ vector)
         if abs(before - hazard) <= _SETTLED * hazard:
             return hazard / exceedance(float(k), distribution="chi", dim=dim)
-        vector = vector / float(vector.max())
 
 
 def ar1_risk(k: float, exposure: Exposure) -> float:

@@ -26,11 +26,13 @@ from sbas.integrity.tails.tail_reference import (
     STATISTICS,
     THRESHOLD,
     TailReference,
+    summarise_ordered_tail,
     summarise_tail,
     tail_reference,
 )
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 LEAST_SAMPLES, LEAST_TAUS, LEAST_CLUSTERS = 1000, 20, 10
 SIGNIFICANCE = 0.05
@@ -40,6 +42,7 @@ MOST_CROSSINGS = 1.5
 LARGEST_BIAS, BIAS_CHI2 = 0.2, 9.21
 """Bias over the spread, and its chi-square of two components at 1 %, that refuse together."""
 _REPEATED = 5
+_CELLS_AT_ONCE = 1 << 18
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +96,7 @@ def fit_tail(
     error_m: ArrayLike,
     sigma_m: ArrayLike,
     *,
-    time_s: ArrayLike,
+    time_s: ArrayLike | None = None,
     interval_s: float,
     tau_s: float,
     tau_low_s: float | None = None,
@@ -106,10 +109,10 @@ def fit_tail(
     ----------
     error_m : (2, n) signed east and north errors [m], or (n,) their size. Signed errors show a
         bias and the ellipse; from the size alone equal axes are supposed, and a bias below
-        1.5 sigma goes unseen.
+        1.5 sigma goes unseen. Single precision is taken as it is.
     sigma_m : (n,) or scalar, standard deviation along the major axis that each error should
-        have [m]; samples where either is missing (NaN) are left out.
-    time_s : (n,) increasing [s].
+        have [m]; samples without an error or a finite sigma (NaN) are left out.
+    time_s : (n,) increasing [s]; None: a regular grid of `interval_s`, NaN where missing.
     interval_s : step of the record [s]; a longer step than 1.5 times it is a gap.
     tau_s, tau_low_s, tau_high_s : decorrelation time of an error component with its interval
         [s]; without an interval it counts as known.
@@ -143,8 +146,9 @@ def fit_tail(
     require("tau_low_s", low, above=interval_s, most=tau_s)
     require("tau_high_s", high, least=tau_s)
     require("nugget", nugget, least=0, most=0.99)
-    scaled, time = _scaled(error_m, sigma_m, time_s)
-    n = time.size
+    time = None if time_s is None else np.asarray(time_s, dtype=np.float64)
+    scaled = _scaled(error_m, sigma_m, time)
+    n, y = scaled.samples, scaled.y
     taus = n * interval_s / tau_s
     if n < LEAST_SAMPLES or taus < LEAST_TAUS:
         return Refusal(
@@ -152,30 +156,37 @@ def fit_tail(
             f"record at least {LEAST_SAMPLES} epochs and {LEAST_TAUS} decorrelation times",
         )
     bias, bias_refusal, axis_ratio = _bias_and_axes(scaled, taus)
-    y = (scaled**2).sum(axis=0) / 2
-    summary = summarise_tail(y)
+    ordered = np.sort(y)[:n]  # what is missing comes last
+    summary = summarise_ordered_tail(ordered)
     u, b = float(summary.threshold[THRESHOLD]), float(summary.excess[THRESHOLD])
     if not (u > 0 and b > 0):
         return Refusal("the errors beyond their 95 % quantile are all alike", "check the errors")
+    clipped, empirical = _clipped(ordered), _empirical_tail(ordered)
+    del ordered
     family = tail_family(axis_ratio)
     reference = tail_reference(
         taus, per_tau=tau_s / interval_s, axis_ratio=axis_ratio, nugget=nugget
     )
     # The reference has PER_TAU samples per tau: the same thinning, or its largest is smaller.
     thin = max(1, round(tau_s / interval_s / PER_TAU))
-    z, fit_p = reference.misfit(summarise_tail(y[::thin]).statistic)
+    known = y if n == y.size else y[~np.isnan(y)]
+    z, fit_p = reference.misfit(summarise_tail(known[::thin]).statistic)
+    del known
     above = np.flatnonzero(y >= u)
-    gap = np.diff(time, prepend=time[0]) > 1.5 * interval_s
-    rises = int(np.count_nonzero((y[1:] >= u) & (y[:-1] < u) & ~gap[1:]))
     expected = crossings_per_exceedance(tau_s, interval_s=interval_s, nugget=nugget)
-    crossings = rises / above.size / expected
-    grid = np.rint((time[above] - time[0]) / interval_s).astype(np.int64)
-    clusters = run_clusters(np.unique(grid), merge_samples=tau_s / 2 / interval_s).count
-    refusal = _few(clusters) or _clipped(y) or bias_refusal
+    crossings = _rises(y, above, u, time, 1.5 * interval_s) / above.size / expected
+    grid = above
+    if time is not None:
+        grid = np.unique(np.rint((time[above] - time[0]) / interval_s).astype(np.int64))
+    clusters = run_clusters(grid, merge_samples=tau_s / 2 / interval_s).count
+    refusal = _few(clusters) or clipped or bias_refusal
     refusal = refusal or _misfit(z, fit_p) or _too_rough(crossings)
-    excess_of = np.where(y >= u, y - u, 0.0)
+    excess_of = y[above].astype(np.float64) - u
     block = max(1, min(round(10 * tau_s / interval_s), n // 5))
-    edges = np.arange(0, n - block + 1, block)
+    # Blocks hold known samples only; the last one takes the rest.
+    rank = above if n == y.size else above - np.searchsorted(np.flatnonzero(np.isnan(y)), above)
+    blocks = n // block
+    of_block = np.minimum(rank // block, blocks - 1)
     return TailFit(
         refusal=refusal,
         threshold=u,
@@ -196,52 +207,100 @@ def fit_tail(
         tau_high_s=high,
         nugget=nugget,
         stability=_stability(family, summary.threshold, summary.excess, reference),
-        **_empirical_tail(y),
-        block_count=np.add.reduceat((y >= u).astype(np.float64), edges),
-        block_sum=np.add.reduceat(excess_of, edges),
+        **empirical,
+        block_count=np.bincount(of_block, minlength=blocks).astype(np.float64),
+        block_sum=np.bincount(of_block, excess_of, blocks).astype(np.float64),
     )
 
 
 # --- fitting ----------------------------------------------------------------------------------
 
 
-def _scaled(error_m: ArrayLike, sigma_m: ArrayLike, time_s: ArrayLike) -> tuple[Floats, Floats]:
-    """(c, n) errors over sigma and (n,) times of the samples that have all."""
-    error = np.atleast_2d(np.asarray(error_m, dtype=np.float64))
-    time = np.asarray(time_s, dtype=np.float64)
-    sigma = np.asarray(sigma_m, dtype=np.float64)
-    if error.shape[0] > 2 or error.shape[1:] != time.shape or sigma.shape not in ((), time.shape):
+@dataclass(frozen=True, eq=False)
+class _Scaled:
+    """Squared sizes of errors over sigma, halved, (n,) with NaN where missing; and moments.
+
+    `mean` (c,) and `products` (c, c) about it are of the c components of the known samples.
+    """
+
+    y: NDArray[np.floating[Any]]
+    samples: int
+    mean: Floats
+    products: Floats
+
+
+def _scaled(error_m: ArrayLike, sigma_m: ArrayLike, time: Floats | None) -> _Scaled:
+    error, sigma = np.atleast_2d(_floating(error_m)), _floating(sigma_m)
+    shape = error.shape[1:] if time is None else time.shape
+    if error.shape[0] > 2 or error.shape[1:] != shape or sigma.shape not in ((), shape):
+        lengths = "errors and sigmas" if time is None else "errors, sigmas and times"
         raise InputError(
-            "errors, sigmas and times differ in length",
+            f"{lengths} differ in length",
             where="error_m, sigma_m, time_s",
-            evidence=f"shapes {error.shape}, {sigma.shape}, {time.shape}",
+            evidence=f"shapes {error.shape}, {sigma.shape}, {shape}",
         )
-    if not np.all(np.diff(time) > 0):
+    if time is not None and not np.all(time[1:] > time[:-1]):
         raise InputError("times do not increase", where="time_s", cure="sort the record")
-    if np.any(sigma <= 0) or np.any(np.isinf(error)):
-        raise InputError(
-            "a sigma is not above 0, or an error is infinite", where="sigma_m, error_m"
-        )
-    if error.shape[0] == 1 and np.any(error < 0):
-        raise InputError(
-            "sizes of errors are not negative",
-            where="error_m",
-            cure="give signed errors as (2, n): east and north",
-        )
-    scaled = error / sigma
-    known = np.isfinite(scaled).all(axis=0)
-    return scaled[:, known], time[known]
+    precision = error.dtype if sigma.ndim == 0 else np.result_type(error, sigma)
+    y = np.empty(shape, precision)
+    samples, origin = 0, None
+    total, squares = np.zeros(error.shape[0]), np.zeros((error.shape[0], error.shape[0]))
+    for first in range(0, y.size, _CELLS_AT_ONCE):
+        part = slice(first, first + _CELLS_AT_ONCE)
+        size = error[:, part]
+        of_part = sigma if sigma.ndim == 0 else sigma[part]
+        if np.any(of_part <= 0) or np.any(np.isinf(size)):
+            raise InputError(
+                "a sigma is not above 0, or an error is infinite", where="sigma_m, error_m"
+            )
+        if error.shape[0] == 1 and np.any(size < 0):
+            raise InputError(
+                "sizes of errors are not negative",
+                where="error_m",
+                cure="give signed errors as (2, n): east and north",
+            )
+        scaled = (size / np.where(np.isfinite(of_part), of_part, np.nan)).astype(precision)
+        y[part] = (scaled**2).sum(axis=0) / 2
+        known = scaled[:, ~np.isnan(y[part])].astype(np.float64)
+        if known.shape[1] == 0:
+            continue
+        # About a value of theirs, constants have moments of exactly 0.
+        origin = known[:, :1].copy() if origin is None else origin
+        known -= origin
+        samples += known.shape[1]
+        total += known.sum(axis=1)
+        squares += known @ known.T
+    if origin is None:
+        return _Scaled(y, 0, total, squares)
+    mean = total / samples
+    return _Scaled(y, samples, origin[:, 0] + mean, squares - samples * np.outer(mean, mean))
 
 
-def _bias_and_axes(scaled: Floats, taus: float) -> tuple[float | None, Refusal | None, float]:
-    if scaled.shape[0] == 1:
+def _floating(values: ArrayLike) -> NDArray[np.floating[Any]]:
+    array = np.asarray(values)
+    return array if array.dtype == np.float32 else array.astype(np.float64, copy=False)
+
+
+def _rises(
+    y: NDArray[np.floating[Any]], above: Indices, u: float, time: Floats | None, gap_s: float
+) -> int:
+    """Upcrossings of u between successive samples without a gap."""
+    after = above[above > 0]
+    rise = y[after - 1] < u
+    if time is not None:
+        rise &= time[after] - time[after - 1] <= gap_s
+    return int(np.count_nonzero(rise))
+
+
+def _bias_and_axes(scaled: _Scaled, taus: float) -> tuple[float | None, Refusal | None, float]:
+    if scaled.mean.size == 1:
         return None, None, 1.0
-    minor, major = np.linalg.eigvalsh(np.cov(scaled))
+    minor, major = np.linalg.eigvalsh(scaled.products / (scaled.samples - 1))
     if not major > 0:
         return None, Refusal("the errors do not vary"), 1.0
     axis_ratio = round(20 * math.sqrt(max(minor, 0.0) / major)) / 20
-    mean, spread = scaled.mean(axis=1), scaled.std(axis=1)
-    ratio = mean / np.where(spread > 0, spread, math.inf)
+    spread = np.sqrt(np.maximum(np.diag(scaled.products), 0.0) / scaled.samples)
+    ratio = scaled.mean / np.where(spread > 0, spread, math.inf)
     bias = float(np.hypot(*ratio))
     # T/(2 tau) samples for a mean.
     if bias > LARGEST_BIAS and bias**2 * taus / 2 > BIAS_CHI2:
@@ -262,8 +321,9 @@ def _few(clusters: int) -> Refusal | None:
     )
 
 
-def _clipped(y: Floats) -> Refusal | None:
-    repeated = int(np.count_nonzero(y >= y.max() * (1 - 1e-9)))
+def _clipped(ordered: NDArray[np.floating[Any]]) -> Refusal | None:
+    least = float(ordered[-1]) * (1 - 1e-9)
+    repeated = ordered.size - int(np.searchsorted(ordered, ordered.dtype.type(least)))
     if repeated < _REPEATED:
         return None
     return Refusal(
@@ -306,8 +366,7 @@ def _stability(
     return np.column_stack([QUANTILES, threshold, scale, reference.stability])
 
 
-def _empirical_tail(y: Floats) -> dict[str, Any]:
+def _empirical_tail(ordered: NDArray[np.floating[Any]]) -> dict[str, Any]:
     """At most 300 points of the upper half, evenly spaced in the logarithm of the share."""
-    ordered = np.sort(y)[::-1]
-    rank = np.unique(np.geomspace(1, y.size / 2, 300).astype(np.int64))
-    return {"tail_y": ordered[rank - 1], "tail_share": rank / y.size}
+    rank = np.unique(np.geomspace(1, ordered.size / 2, 300).astype(np.int64))
+    return {"tail_y": ordered[-rank].astype(np.float64), "tail_share": rank / ordered.size}

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from sbas.estimate import Estimate, Fitted, Refusal
 from sbas.exceptions import InputError
 from sbas.integrity.counting import Sided, checked_alpha
-from sbas.integrity.tails.sampled_clock import hazard_per_s
+from sbas.integrity.tails.sampled_clock import log_hazards
 from sbas.integrity.tails.tail_family import TailFamily, tail_family
 from sbas.integrity.tails.tail_fit import LEAST_TAUS, TailFit
 from sbas.integrity.tails.tail_reference import tail_reference
@@ -26,7 +26,9 @@ Floats = NDArray[np.float64]
 HEAVY_SCALE = 1.1
 """Scale of sigma^2 above which the result carries a flag."""
 MOST_DECADES = 12.0
-_BOOTSTRAPS, _SEED, _NODES = 400, 20261122, 64
+_BOOTSTRAPS, _SEED, _NODES = 400, 20261122, 128
+_DEEPEST = 40.0
+"""In K^2/2: a level so much deeper than the lowest has less than e-40 of its hazard."""
 _CURVE = np.concatenate([np.arange(0.0, 40.0, 0.25), np.geomspace(40.0, 400.0, 40)])
 
 
@@ -34,6 +36,7 @@ def modelled_rate(
     fit: TailFit | Refusal,
     level_k: ArrayLike,
     *,
+    counts: ArrayLike | None = None,
     confidence: float = 0.95,
     sided: Sided = "upper",
 ) -> Estimate | Refusal:
@@ -42,8 +45,9 @@ def modelled_rate(
     Parameters
     ----------
     fit : result of `fit_tail`.
-    level_k : level over sigma [1], one for all epochs or (n,) one an epoch: HPL/sigma for
+    level_k : level over sigma [1], one for all epochs or (m,) several: HPL/sigma for
         HPE >= HPL, AL/sigma for HPE >= AL; infinite where the event is impossible (HPL >= AL).
+    counts : (m,) epochs at each level; None: one each.
     confidence : of the bound, in [0.5, 1).
     sided : "upper", "lower" or "two".
 
@@ -55,7 +59,8 @@ def modelled_rate(
 
     Raises
     ------
-    InputError : levels that are negative or NaN, or a confidence out of range.
+    InputError : levels that are negative or NaN, counts that are not those of the levels, or a
+        confidence out of range.
 
     Notes
     -----
@@ -76,34 +81,32 @@ def modelled_rate(
         return fit
     if fit.refusal is not None:
         return fit.refusal
-    levels, counts, epochs = _levels(level_k)
+    levels, weights, possible = _levels(level_k, counts)
     if levels.size == 0:
         return Refusal("the event is impossible at every epoch: the level is above its limit")
     nodes = levels
     if levels.size > _NODES:
-        # ln hazard is nearly a straight line between neighbours 5 % apart.
-        nodes = np.geomspace(max(levels[0], 1e-3), max(levels[-1], 2e-3), _NODES)
+        # Epochs beyond the highest node count with it: far too rare to be seen in the sum, even
+        # by the bound, which is flatter than the tail.
+        highest = math.hypot(levels[0], math.sqrt(6 * _DEEPEST * fit.scale))
+        nodes = np.geomspace(max(levels[0], 1e-3), max(min(levels[-1], highest), 2e-3), _NODES)
     value_v, low_v, high_v = _level_bounds(fit, nodes**2 / 2, alpha)
 
     def rate(v: Floats, tau_s: float) -> float:
-        hazards = [
-            hazard_per_s(
-                math.sqrt(2 * at), tau_s=tau_s, interval_s=fit.interval_s,
-                axis_ratio=fit.axis_ratio, nugget=fit.nugget,
-            )
-            for at in v
-        ]  # fmt: skip
-        log_hazard = np.log(np.maximum(hazards, 1e-300))
-        at_levels = np.exp(np.interp(levels, nodes, log_hazard))
-        return 3600 * float(np.dot(counts, at_levels)) / epochs
+        # Over y the fitted level is nearly a straight line.
+        at = np.interp(levels**2, nodes**2, v)
+        log_hazard = log_hazards(
+            np.sqrt(2 * np.minimum(at, at.min() + _DEEPEST)), tau_s=tau_s,
+            interval_s=fit.interval_s, axis_ratio=fit.axis_ratio, nugget=fit.nugget,
+        )  # fmt: skip
+        return 3600 * float(np.dot(weights, np.exp(log_hazard)))
 
     value = rate(value_v, fit.tau_s)
     decades = -math.log10(value * fit.hours) if value > 1e-290 else math.inf
     if decades > MOST_DECADES:
-        nearest = math.sqrt(2 * float(value_v.min()))
         return Refusal(
-            f"the level lies at {nearest:.3g} fitted sigma, more than {MOST_DECADES:g} decades "
-            f"beyond the {fit.hours:.4g} h of the record",
+            f"the level lies more than {MOST_DECADES:g} decades beyond the {fit.hours:.4g} h of "
+            "the record",
             "no tail says anything there; use the demonstrated bound",
         )
     # A longer tau lowers the rate, a higher level too: both are taken to the side asked for.
@@ -118,7 +121,7 @@ def modelled_rate(
         basis=Fitted("tail of all exceedances with a Gauss-Markov clock", _parameters(fit),
                      max(0.0, decades)),
         sided=sided,
-        caveats=_caveats(fit, float(counts.sum()) / epochs),
+        caveats=_caveats(fit, possible),
     )  # fmt: skip
 
 
@@ -151,15 +154,24 @@ def tail_probability(
 # --- level and bounds -------------------------------------------------------------------------
 
 
-def _levels(level_k: ArrayLike) -> tuple[Floats, NDArray[np.int64], int]:
-    """Distinct finite levels, epochs with each, and all epochs."""
+def _levels(level_k: ArrayLike, counts: ArrayLike | None) -> tuple[Floats, Floats, float]:
+    """Distinct finite levels, the share of the epochs with each, and of all that have one."""
     level = np.atleast_1d(np.asarray(level_k, dtype=np.float64)).ravel()
     if level.size == 0 or np.isnan(level).any() or np.any(level < 0):
         raise InputError(
             "levels are numbers of 0 or more", where="level_k", evidence=f"{level.size} levels"
         )
-    distinct, counts = np.unique(level[np.isfinite(level)], return_counts=True)
-    return distinct, counts, level.size
+    epochs = np.ones(level.size) if counts is None else np.asarray(counts, dtype=np.float64).ravel()
+    if epochs.shape != level.shape or not (np.all(epochs >= 0) and 0 < epochs.sum() < math.inf):
+        raise InputError(
+            "counts are numbers of epochs, one a level, of which some are above 0",
+            where="counts",
+            evidence=f"{epochs.size} counts for {level.size} levels, sum {epochs.sum():g}",
+        )
+    some = np.isfinite(level) & (epochs > 0)
+    distinct, which = np.unique(level[some], return_inverse=True)
+    shares = np.bincount(which, epochs[some], distinct.size) / epochs.sum()
+    return distinct, shares, float(epochs[some].sum() / epochs.sum())
 
 
 def _level_bounds(fit: TailFit, y: Floats, alpha: float) -> tuple[Floats, Floats, Floats]:
@@ -178,17 +190,24 @@ def _level_bounds(fit: TailFit, y: Floats, alpha: float) -> tuple[Floats, Floats
         return np.asarray(np.interp(observed, seen, _CURVE) + beyond)
 
     value = inverse(fit.taus, 0.5)
+    excess, share = _resampled(fit)
+    again = _fitted_level(family, y, fit.threshold, excess, share)
+    lowest, highest = np.quantile(again, [alpha, 1 - alpha], axis=0)
+    low = np.minimum(inverse(fewest, 1 - alpha), lowest)
+    high = np.maximum(inverse(fewest, alpha), highest)
+    return value, np.minimum(low, value), np.maximum(high, value)
+
+
+@lru_cache(maxsize=4)
+def _resampled(fit: TailFit) -> tuple[Floats, Floats]:
+    """Mean excess and share beyond the threshold of (r, 1) block bootstraps."""
     generator = np.random.default_rng(_SEED)
     blocks = fit.block_count.size
     pick = generator.integers(0, blocks, (_BOOTSTRAPS, blocks))
     count, total = fit.block_count[pick].sum(axis=1), fit.block_sum[pick].sum(axis=1)
     filled = (count > 0) & (total > 0)
     count, total = count[filled, None], total[filled, None]
-    share = 0.05 * count / fit.block_count.mean() / blocks
-    again = _fitted_level(family, y, fit.threshold, total / count, share)
-    low = np.minimum(inverse(fewest, 1 - alpha), np.quantile(again, alpha, axis=0))
-    high = np.maximum(inverse(fewest, alpha), np.quantile(again, 1 - alpha, axis=0))
-    return value, np.minimum(low, value), np.maximum(high, value)
+    return total / count, 0.05 * count / fit.block_count.mean() / blocks
 
 
 @lru_cache(maxsize=128)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 from importlib.metadata import version
 
+from sbas.estimate import Refusal
 from sbas.integrity.results import Evaluation
 from sbas.numerals import percent
 from sbas.reporting.content import Cell, Section, table
@@ -18,7 +19,7 @@ def section(evaluation: Evaluation) -> Section:
     rows: list[tuple[Cell | str, ...]] = [
         ("alert limits", ", ".join(f"{al:g}" for al in s.alert_limits_m) + " m", "horizontal"),
         ("time to alert", f"{s.time_to_alert_s:g} s", "an HMI event lasts at least this"),
-        ("merge time, rates", f"{s.merge_s:g} s", "closer events are one in a rate"),
+        ("merge time, rates", f"{evaluation.merge_s:.4g} s", _merge_words(evaluation)),
         ("merge time, event list", f"{s.reset_s:g} s", "reset time of the user system"),
         ("confidence", f"{percent(s.confidence)}", "of every one-sided bound"),
         ("findings accepted", ", ".join(s.accept) or "none", "errors taken as warnings"),
@@ -37,3 +38,11 @@ def section(evaluation: Evaluation) -> Section:
             table("Software", "Program|Version|Used for", versions),
         ),
     )
+
+
+def _merge_words(evaluation: Evaluation) -> str:
+    if evaluation.settings.merge_s is not None:
+        return "closer events are one in a rate"
+    if isinstance(evaluation.process.decorrelation.tau_s, Refusal):
+        return "closer events are one in a rate; 60 s, no decorrelation time is known"
+    return "closer events are one in a rate; max(tau/2, 60 s) of the measured tau"

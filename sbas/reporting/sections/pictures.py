@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 from sbas.integrity.results import Evaluation
 from sbas.numerals import count
 from sbas.plots import (
@@ -15,9 +12,8 @@ from sbas.plots import (
     recording_strips,
     stanford_diagram,
 )  # fmt: skip
-from sbas.plots.style import Sheet, house_style
-from sbas.reporting.content import Picture, Section
-from sbas.reporting.inline_svg import inline_svg
+from sbas.reporting.content import Section
+from sbas.reporting.drawn import drawn
 
 
 def section(evaluation: Evaluation) -> Section:
@@ -29,7 +25,7 @@ def section(evaluation: Evaluation) -> Section:
         "pictures",
         "Pictures",
         pictures=(
-            _picture(
+            drawn(
                 "strips", "The recording over time", recording_strips.SHEET,
                 lambda axes: recording_strips.strips(evaluation, axes=axes),
                 "Four strips over time: protection level, satellites, HDOP, error with its sigma.",
@@ -39,7 +35,7 @@ def section(evaluation: Evaluation) -> Section:
                 f"Alert limits: {limits} m.",
                 wide=True,
             ),
-            _picture(
+            drawn(
                 "stanford", "Stanford diagram", stanford_diagram.SHEET,
                 lambda axes: stanford_diagram.stanford(evaluation, ax=axes[0]),
                 f"Protection level against error, coloured by epochs, alert limit {widest:g} m.",
@@ -47,21 +43,21 @@ def section(evaluation: Evaluation) -> Section:
                 f"bound the error (MI), and beyond {widest:g} m unnoticed (HMI). The numbers count "
                 f"raw epochs for an alert limit of {widest:g} m.",
             ),
-            _picture(
+            drawn(
                 "scatter", "Scatter of the horizontal error", error_scatter.SHEET,
                 lambda axes: error_scatter.scatter(evaluation, ax=axes[0]),
                 "Density of east and north errors with mean, 1-sigma and 95 percent ellipse.",
                 "A mean away from the cross is a constant offset (antenna, frame, truth); points "
                 "far outside the dashed ellipse are tails that a Gauss model misses.",
             ),
-            _picture(
+            drawn(
                 "survival", "How much of the level the error uses", ratio_survival.SHEET,
                 lambda axes: ratio_survival.survival(evaluation, ax=axes[0]),
                 "Share of epochs whose ratio of error to level is at or above each value.",
                 "The distance between the foot of the curve and the line at 1 is the margin that "
                 "was seen. Epochs are correlated: the curve describes, it does not extrapolate.",
             ),
-            _picture(
+            drawn(
                 "availability", "Availability against alert limit",
                 availability_against_limit.SHEET,
                 lambda axes: availability_against_limit.availability_curve(evaluation, ax=axes[0]),
@@ -70,29 +66,14 @@ def section(evaluation: Evaluation) -> Section:
                 f"of {count(evaluation.epochs)} epochs was lost. The distance from open to filled "
                 f"marks is what gaps cost.",
             ),
-            _picture(
+            drawn(
                 "rates", "Rate of events against alert limit", rates_against_limit.SHEET,
                 lambda axes: rates_against_limit.rate_curve(evaluation, ax=axes[0]),
-                "Demonstrated upper bounds and the claimed rate against the alert limit.",
+                "Demonstrated, modelled and claimed rates against the alert limit.",
                 "At the stated confidence the true rate lies below the triangles. From there down "
-                "to the dotted claim this recording proves nothing. Bands: IEC 61508-1, 7.6.2.",
+                "to the dotted claim this recording proves nothing. Modelled rates, where given, "
+                "hold as far as the error stays Gaussian. Bands: IEC 61508-1, 7.6.2.",
                 wide=True,
             ),
         ),
     )  # fmt: skip
-
-
-def _picture(
-    key: str,
-    title: str,
-    sheet: Sheet,
-    draw: Callable[[Any], Any],
-    alt: str,
-    caption: str,
-    *,
-    wide: bool = False,
-) -> Picture:
-    with house_style():
-        axes = sheet.axes()
-    draw(axes)
-    return Picture(key, title, alt, caption, inline_svg(axes[0].figure, key=key, alt=alt), wide)

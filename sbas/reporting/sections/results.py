@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from decimal import ROUND_CEILING, ROUND_FLOOR
 
-from sbas.estimate import Counted, Estimate, Refusal
+from sbas.estimate import Counted, Estimate, Fitted, Refusal
 from sbas.integrity.availability import Availability
 from sbas.integrity.rate_evidence import EVENT_KINDS
 from sbas.integrity.results import Evaluation
@@ -83,36 +83,37 @@ def _rates(evaluation: Evaluation) -> Table:
     for limit in evaluation.alert_limits:
         for kind, rate in limit.rates.items():
             classes = (rate.demonstrated, rate.modelled, rate.claimed)
-            upper = getattr(rate.demonstrated, "upper", None)
             counted, modelled, claimed = map(_value, classes)
             rows.append(
                 (
                     f"{limit.alert_limit_m:g}", Cell(_EVENT_NAMES[kind], trace="rates"),
                     count(rate.events), number(rate.hours, 6), counted,
-                    _ABSENT if upper is None else upward(upper), modelled, claimed,
+                    _upper(rate.demonstrated), modelled, _upper(rate.modelled), claimed,
                 )
             )  # fmt: skip
-            for name, figure in zip(("demonstrated", "modelled", "claimed"), classes, strict=True):
-                said.setdefault((name, _words(figure)), []).append(_EVENT_NAMES[kind])
+            where = f"{_EVENT_NAMES[kind]}, {limit.alert_limit_m:g} m"
+            for name, figure in zip(_CLASSES, classes, strict=True):
+                said.setdefault((name, _words(figure)), []).append(where)
     definitions = "; ".join(f"{_EVENT_NAMES[k]}: {text}" for k, text in EVENT_KINDS.items())
     settings = evaluation.settings
     return table(
         "Rates of events per hour, by evidence class",
         "#Alert limit [m]|Event|#Events|#Hours [h]|#Demonstrated: counted [1/h]|"
         f"#Demonstrated: upper bound at {percent(settings.confidence)} [1/h]|#Modelled [1/h]|"
-        "#Claimed [1/h]",
+        f"#Modelled: upper bound at {percent(settings.confidence)} [1/h]|#Claimed [1/h]",
         rows,
         definitions.replace(">=", "≥") + ".",
         *(
-            f"{name.capitalize()} ({', '.join(dict.fromkeys(kinds))}): {words}."
-            for (name, words), kinds in said.items()
+            f"{name.capitalize()} ({'; '.join(places)}): {words}."
+            for (name, words), places in said.items()
             if words
         ),
-        f"Events closer than {settings.merge_s:g} s count as one; the bound is exact for "
+        f"Events closer than {evaluation.merge_s:.4g} s count as one; the bound is exact for "
         "independent events. No event seen is no rate of zero: only the bound says something.",
     )
 
 
+_CLASSES = ("demonstrated", "modelled", "claimed")
 _EVENT_NAMES = {"hmi": "HMI", "mi": "MI", "exceeds_al": "HPE ≥ AL"}
 
 
@@ -123,12 +124,21 @@ def _value(figure: Estimate | Refusal) -> str:
     return number(figure.value) if isinstance(figure, Estimate) else _ABSENT
 
 
+def _upper(figure: Estimate | Refusal) -> str:
+    upper = figure.upper if isinstance(figure, Estimate) else None
+    return _ABSENT if upper is None else upward(upper)
+
+
 def _words(figure: Estimate | Refusal) -> str:
     """What must be said below the table; a count is explained by its own columns."""
     if isinstance(figure, Refusal):
-        return str(figure)
+        return f"{_ABSENT}: {figure.reason}"
     if isinstance(figure.basis, Counted):
         return ""
+    if isinstance(figure.basis, Fitted):
+        # Its parameters have a table of their own.
+        decades = f"{figure.basis.extrapolation_factor:.1f} decades beyond the data"
+        return "; ".join((decades, *figure.caveats))
     return "; ".join((str(figure.basis), *figure.caveats))
 
 
@@ -140,8 +150,10 @@ def _availability(evaluation: Evaluation) -> Table:
         window = up.continuity_window_epochs
         rows.append(
             (
-                f"{limit.alert_limit_m:g}", share(up.availability.value),
-                share(up.availability_excluding_gaps.value), count(up.losses), *_mttf(up),
+                f"{limit.alert_limit_m:g}",
+                share(up.availability.value), _lower(up.availability),
+                share(up.availability_excluding_gaps.value),
+                _lower(up.availability_excluding_gaps), count(up.losses), *_mttf(up),
                 *_mttr(up), upward(up.continuity_risk, 3),
                 upward(up.continuity_risk_excluding_gaps, 3),
             )
@@ -149,14 +161,27 @@ def _availability(evaluation: Evaluation) -> Table:
     confidence = f"{percent(evaluation.settings.confidence)}"
     return table(
         "Availability and continuity of the service (demonstrated: counted in this recording)",
-        "#Alert limit [m]|#Availability, gaps down|#Availability, gaps left out|#Losses|"
+        f"#Alert limit [m]|#Availability, gaps down|#lower bound at {confidence}|"
+        f"#Availability, gaps left out|#lower bound at {confidence}|#Losses|"
         f"#MTTF|#MTTF, lower bound at {confidence}|#MTTR|#MTTR, upper bound at {confidence}|"
         "#Continuity risk, gaps are losses|#Continuity risk, gaps left out",
         rows,
-        "Up: a fix with HPL < alert limit. Availability describes this recording; epochs are "
-        "correlated, so no interval follows from their number. It is rounded down.",
+        "Up: a fix with HPL < alert limit. Availability is rounded down.",
+        *dict.fromkeys(
+            f"{caveat[0].upper()}{caveat[1:]}."
+            for limit in evaluation.alert_limits
+            for estimate in (
+                limit.availability.availability,
+                limit.availability.availability_excluding_gaps,
+            )
+            for caveat in estimate.caveats
+        ),
         f"Continuity risk: probability to lose the service within {window} epochs, being up now.",
     )
+
+
+def _lower(figure: Estimate) -> str:
+    return _ABSENT if figure.lower is None else share(figure.lower)
 
 
 def _mttf(up: Availability) -> tuple[str, str]:

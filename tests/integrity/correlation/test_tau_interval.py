@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -123,6 +124,18 @@ def test_intervals_cover_and_values_are_median_unbiased(monkeypatch: pytest.Monk
     # Binomial: 57 of 60 with standard deviation 1.7; a median known to 1.25 * 0.13/sqrt(60).
     assert held >= 52
     assert np.median(values) == pytest.approx(tau, rel=0.06)
+
+
+@pytest.mark.parametrize(("cells", "tau"), [(3000, 20.0), (1500, 400.0)])
+def test_threads_change_no_digit(monkeypatch: pytest.MonkeyPatch, cells: int, tau: float) -> None:
+    monkeypatch.setattr(tau_module, "MOST", 500)
+    found = []
+    for threads in (1, 4):
+        simulated_estimates.cache_clear()
+        monkeypatch.setattr(tau_module, "MOST_THREADS", threads)
+        monkeypatch.setattr(os, "cpu_count", lambda: 8)
+        found.append(interval_of(gauss_markov(8, cells, tau))[0])
+    assert found[0] == found[1]
 
 
 def test_a_record_of_a_few_tau_has_no_upper_limit() -> None:

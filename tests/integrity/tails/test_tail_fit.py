@@ -158,6 +158,60 @@ def test_missing_samples_are_left_out_and_gaps_are_no_crossings() -> None:
     assert missing.crossings == whole.crossings
 
 
+def same_fit(a: TailFit, b: TailFit, rel: float) -> None:
+    for name in ("threshold", "excess", "scale", "fit_p", "crossings", "bias", "axis_ratio"):
+        assert getattr(a, name) == pytest.approx(getattr(b, name), rel=rel), name
+    assert (a.samples, a.clusters, a.refusal) == (b.samples, b.clusters, b.refusal)
+    np.testing.assert_allclose(a.block_count, b.block_count, atol=1)
+    np.testing.assert_allclose(a.block_sum, b.block_sum, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(a.tail_y, b.tail_y, rtol=rel)
+
+
+def test_a_grid_with_missing_cells_is_a_record_with_times() -> None:
+    error, sigma = gauss_markov(10), 1 + 0.3 * np.cos(np.arange(N) / 2000)
+    error = error * sigma
+    error[:, 300:900] = np.nan
+    error[0, 5000] = np.nan
+    sigma[7000:7100] = np.nan
+    kept = np.isfinite(error).all(axis=0) & np.isfinite(sigma)
+    times = 1e9 + np.arange(N)
+    whole = fitted(error[:, kept], sigma[kept], time_s=times[kept])
+    grid = fitted(error, sigma, time_s=None)
+    assert grid.samples == N - 701
+    same_fit(grid, whole, 1e-12)
+    np.testing.assert_allclose(grid.block_sum, whole.block_sum, rtol=1e-9)
+
+
+def test_single_precision_is_enough() -> None:
+    error, sigma = gauss_markov(11), np.full(N, 1.5)
+    double = fitted(error, sigma, time_s=None)
+    same_fit(fitted(error.astype(np.float32), sigma.astype(np.float32), time_s=None), double, 1e-5)
+    same_fit(fitted(error.astype(np.float32), 1.5, time_s=None), double, 1e-5)
+
+
+def test_bias_and_axes_by_the_definition() -> None:
+    """Sample mean over sample deviation, root of the ratio of the covariance's eigenvalues."""
+    turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+    error = turn @ (np.array([[1.0], [0.6]]) * gauss_markov(12, n=400_000)) + 0.05
+    fit = fitted(error, time_s=None)
+    assert fit.bias == pytest.approx(float(np.hypot(*(error.mean(axis=1) / error.std(axis=1)))))
+    minor, major = np.linalg.eigvalsh(np.cov(error))
+    assert fit.axis_ratio == pytest.approx(math.sqrt(minor / major), abs=0.026)
+
+
+def test_an_infinite_sigma_is_missing_not_a_small_error() -> None:
+    error, sigma, holes = gauss_markov(13), np.ones(N), np.ones(N)
+    sigma[100:4000], holes[100:4000] = np.inf, np.nan
+    same_fit(fitted(error, sigma, time_s=None), fitted(error, holes, time_s=None), 1e-12)
+
+
+def test_lengths_without_times_are_compared() -> None:
+    with pytest.raises(InputError, match="errors and sigmas differ in length"):
+        fitted(gauss_markov(9), np.ones(5), time_s=None)
+    with pytest.raises(InputError, match="infinite"):
+        fitted(np.full((2, N), np.inf), time_s=None)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -94,6 +94,36 @@ def test_many_levels_are_interpolated(fit: object) -> None:
     assert given(fit, level).value == pytest.approx(exact, rel=5e-3)
 
 
+def test_many_levels_are_the_mean_of_each() -> None:
+    """A histogram of levels 4 to 60, of which the lowest decide; white noise in the clock."""
+    fit = fitted(gauss_markov(21), tau_low_s=18.0, tau_high_s=36.0)
+    level = np.geomspace(4.0, 60.0, 200)
+    epochs = np.random.default_rng(1).integers(1, 5000, level.size)
+    found = given(fit, level, counts=epochs, sided="two")
+    each = [given(fit, k, sided="two") for k in level[level < 6.5]]
+    for name in ("value", "lower", "upper"):
+        mean = np.dot(epochs[: len(each)], [getattr(e, name) for e in each]) / epochs.sum()
+        assert getattr(found, name) == pytest.approx(mean, rel=1e-3), name
+
+
+def test_counts_are_epochs(fit: object) -> None:
+    level, counts = [4.0, 5.0, 3.0, np.inf], [3, 2, 0, 5]
+    found = given(fit, level, counts=counts, sided="two")
+    again = given(fit, np.repeat(level, counts), sided="two")
+    for name in ("value", "lower", "upper"):
+        assert getattr(found, name) == pytest.approx(getattr(again, name), rel=1e-12)
+    assert any("50 % of the epochs" in c for c in found.caveats)
+    impossible = modelled_rate(fit, [4.0, np.inf], counts=[0, 7])  # type: ignore[arg-type]
+    assert isinstance(impossible, Refusal)
+    assert "impossible" in impossible.reason
+
+
+@pytest.mark.parametrize("counts", [[1], [1, -1], [0, 0], [1, math.nan], [1, math.inf]])
+def test_bad_counts_are_named(fit: object, counts: list[float]) -> None:
+    with pytest.raises(InputError, match="counts"):
+        modelled_rate(fit, [4.0, 5.0], counts=counts)  # type: ignore[arg-type]
+
+
 def test_a_shorter_tau_raises_the_bound_only() -> None:
     error = gauss_markov(21)
     known, unsure = fitted(error), fitted(error, tau_low_s=18.0, tau_high_s=36.0)

@@ -10,6 +10,7 @@ import pytest
 from sbas.integrity.tails.tail_reference import (
     STATISTICS,
     THRESHOLD,
+    _simulate,
     summarise_tail,
     tail_reference,
 )
@@ -37,6 +38,28 @@ def test_shape_of_exact_pareto_quantiles() -> None:
 
 def test_a_tail_without_spread_is_not_finite() -> None:
     assert not np.isfinite(summarise_tail(np.ones(1000)).statistic).all()
+
+
+def test_single_precision_is_summed_in_double() -> None:
+    y = np.random.default_rng(1).exponential(size=1_000_000)
+    double, single = summarise_tail(y), summarise_tail(y.astype(np.float32))
+    np.testing.assert_allclose(single.excess, double.excess, rtol=1e-6)
+    np.testing.assert_allclose(single.statistic, double.statistic, atol=1e-6)
+    assert single.statistic.dtype == single.excess.dtype == np.float64
+
+
+@pytest.mark.parametrize("nugget", [0.0, 0.2])
+def test_the_same_length_gives_the_same_digits(nugget: float) -> None:
+    """Whatever thread comes first; and the first record is the first that is drawn."""
+    first, second = (_simulate.__wrapped__(500, 10, 0.5, nugget) for _ in range(2))
+    np.testing.assert_array_equal(first.statistic, second.statistic)
+    drawn = np.random.default_rng(20261122).standard_normal((2, 50, 2, 500))
+    r, error = math.exp(-1 / 10), drawn[0, 0].copy()
+    for i in range(1, 500):
+        error[:, i] = r * error[:, i - 1] + math.sqrt(1 - r * r) * drawn[0, 0, :, i]
+    error = math.sqrt(1 - nugget) * error + math.sqrt(nugget) * drawn[1, 0]
+    y = (error[0] ** 2 + (0.5 * error[1]) ** 2) / 2
+    assert first.threshold[0] == pytest.approx(np.sort(y)[[250, 450, 475, 490, 495]])
 
 
 def test_centre_and_spread_follow_the_length() -> None:

@@ -42,26 +42,39 @@ def mode_codes(table: pd.DataFrame) -> NDArray[np.int8]:
     return codes
 
 
+def k_of_modes(level: ProtectionLevelMeta, usual: int) -> Floats:
+    """(m + 1,) horizontal K factor behind the HPL of each of `MODES`; the last is no mode stated.
+
+    Parameters
+    ----------
+    level : what the recording states; its K belongs to the usual mode, and the two modes of
+        DO-229 have their own everywhere else.
+    usual : index of the mode that most epochs have, -1 where most state none.
+
+    Notes
+    -----
+    NaN where K is not known: levels that RAIM or the receiver's own method made have none of
+    this kind.
+    """
+    k = np.full(len(MODES) + 1, np.nan)
+    if level.kind not in ("do229", "unknown"):
+        return k
+    for mode, value in MODE_K_H.items():
+        k[MODES.index(mode)] = value
+    if level.k_h is not None:
+        k[usual] = level.k_h
+    return k
+
+
 def k_of_epochs(table: pd.DataFrame, level: ProtectionLevelMeta) -> Floats:
     """(n,) horizontal K factor behind each epoch's HPL [1]; NaN where it is not known.
 
     Parameters
     ----------
     table : epochs with the column `mode`.
-    level : what the recording states; its K belongs to the mode that most epochs have, and the
-        two modes of DO-229 have their own everywhere else.
-
-    Notes
-    -----
-    Levels that RAIM or the receiver's own method made have no K of this kind.
+    level : what the recording states, see `k_of_modes`.
     """
     codes = mode_codes(table)
-    k = np.full(codes.size, np.nan)
-    if level.kind not in ("do229", "unknown"):
-        return k
-    for mode, value in MODE_K_H.items():
-        k[codes == MODES.index(mode)] = value
-    if level.k_h is not None and codes.size:
-        usual = int(np.bincount(codes + 1).argmax()) - 1
-        k[codes == usual] = level.k_h
+    usual = int(np.bincount(codes + 1).argmax()) - 1 if codes.size else -1
+    k: Floats = k_of_modes(level, usual)[codes]
     return k

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy import special
 
 from sbas.estimate import Counted, Estimate, Refusal
-from sbas.integrity.comparison.time_spans import Spans
 from sbas.integrity.counting import Sided, checked_alpha
 from sbas.integrity.exposure.exposure import require
+from sbas.integrity.shares.time_spans import Spans
 from sbas.timescales import NS_PER_S
 
 Floats = NDArray[np.float64]

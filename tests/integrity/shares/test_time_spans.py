@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sbas.exceptions import InputError
-from sbas.integrity.comparison.time_spans import Spans, spans_of_runs
 from sbas.integrity.events import Stretch, find_runs
+from sbas.integrity.shares.time_spans import Spans, spans_of_runs
 
 S = 1_000_000_000
 

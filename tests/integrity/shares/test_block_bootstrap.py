@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from sbas.estimate import Counted, Estimate, Refusal
 from sbas.exceptions import InputError
-from sbas.integrity.comparison.block_bootstrap import (
+from sbas.integrity.shares.block_bootstrap import (
     merge_time_s,
     quantile_estimate,
     share_difference,
     share_estimate,
 )
-from sbas.integrity.comparison.time_spans import Spans
-from tests.integrity.comparison.test_time_spans import S, on_grid, spans
+from sbas.integrity.shares.time_spans import Spans
+from tests.integrity.shares.test_time_spans import S, on_grid, spans
 
 WHOLE_S = 300_000
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from sbas.integrity.causes.causes import explain
-from sbas.integrity.comparison.epoch_levels import k_of_epochs, usable_hpl_m, whole_table
+from sbas.integrity.epoch_levels import k_of_epochs, usable_hpl_m, whole_table
 from sbas.recording import (
     MODES,
     Flag,

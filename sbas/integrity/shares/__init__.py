@@ -1,0 +1,1 @@
+"""Shares of time, such as availability, with intervals that respect correlation."""
