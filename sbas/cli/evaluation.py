@@ -164,12 +164,14 @@ def print_verdict(result: Evaluation) -> None:
 def _processes(result: Evaluation) -> str:
     """The decorrelation time and what it means for the published K, in two lines."""
     found = result.process.decorrelation
-    lines = [f"decorrelation  {found.tau_s}" if isinstance(found.tau_s, Refusal) else
-             f"decorrelation  tau {found.tau_s.value:.4g} s, {found.interval_text}; events of a "
-             f"rate are runs merged over {result.merge_s:.4g} s"]  # fmt: skip
+    if isinstance(found.tau_s, Refusal):
+        tau = found.verdict_text if found.tau_low_s is not None else str(found.tau_s)
+    else:
+        tau = (f"tau {found.tau_s.value:.4g} s, {found.interval_text}; events of a rate are runs "
+               f"merged over {result.merge_s:.4g} s")  # fmt: skip
     judged = result.railway
     words = judged if isinstance(judged, Refusal) else judged.as_claimed.verdict
-    return "\n".join([*lines, f"published K    {words}"])
+    return f"decorrelation  {tau}\npublished K    {words}"
 
 
 def _upper(figure: Estimate | Refusal) -> str:
@@ -259,6 +261,8 @@ def _print_rate(result: FailureRate) -> None:
     print(f"{evidence.events} events in {evidence.hours:.6g} h of exposure")
     for name in ("demonstrated", "modelled", "claimed"):
         print(f"{name:13s} {getattr(evidence, name)}")
+    if isinstance(evidence.modelled, Estimate):
+        print("\n".join(evidence.modelled.caveats))
     print(f"SIL           {result.sil}")
     if result.target is not None:
         print(f"target        {result.target}")
