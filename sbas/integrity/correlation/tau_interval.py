@@ -26,6 +26,7 @@ from sbas.integrity.correlation.robust_tau import (
     longest_lag,
     regressors,
 )
+from sbas.integrity.gauss_markov_series import gauss_markov_series
 
 STEPS_PER_TAU = 25
 """The record is averaged to about this many steps a decorrelation time."""
@@ -289,8 +290,6 @@ def simulated_estimates(design: Design, log_tau: float) -> Floats:
     Two Gauss-Markov components of correlation `cross`, a white part, gaps, least-squares drift
     and daily terms. Clipping is left out: at 4 sigma it touches 6e-5 of Gauss errors.
     """
-    from scipy.signal import lfilter  # 0.5 s to load: only where an interval is asked for
-
     generator = np.random.default_rng([20090919, abs(round(1e6 * log_tau)), design.cells])
     tau = math.exp(log_tau)
     rho = math.exp(-design.step_s / tau)
@@ -303,8 +302,8 @@ def simulated_estimates(design: Design, log_tau: float) -> Floats:
         known, projection, pairs = setups[batch % len(setups)]
         count = min(rows, draws - done)
         noise = generator.standard_normal((2, count, n), dtype=np.float32)
-        noise[:, :, 0] /= innovation
-        x = lfilter(np.array([innovation], np.float32), np.array([1, -rho], np.float32), noise)
+        noise[:, :, 1:] *= innovation
+        x = gauss_markov_series(noise, rho)
         if design.cross:
             x[1] *= math.sqrt(1 - design.cross**2)
             x[1] += design.cross * x[0]

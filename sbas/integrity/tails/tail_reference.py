@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sbas.integrity.gauss_markov_series import gauss_markov_series
 from sbas.integrity.tails.tail_family import tail_family
 
 Floats = NDArray[np.float64]
@@ -157,8 +158,6 @@ def tail_reference(
 
 @lru_cache(maxsize=32)
 def _simulate(samples: int, per_tau: int, axis_ratio: float, nugget: float) -> TailSummary:
-    from scipy import signal  # 0.6 s to load: only where a tail is fitted
-
     generator = np.random.default_rng(_SEED)
     correlation = math.exp(-1 / per_tau)
     axes = np.array([1.0, axis_ratio])[:, None]
@@ -170,7 +169,7 @@ def _simulate(samples: int, per_tau: int, axis_ratio: float, nugget: float) -> T
 
     def summarised(noise: Floats, white: Floats | None) -> TailSummary:
         noise[..., 1:] *= math.sqrt((1 - correlation) * (1 + correlation))
-        error = signal.lfilter([1.0], [1.0, -correlation], noise, axis=-1)
+        error = gauss_markov_series(noise, correlation)
         if white is not None:
             error = math.sqrt(1 - nugget) * error + math.sqrt(nugget) * white
         return summarise_tail(((axes * error) ** 2).sum(axis=1) / 2)
