@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -122,7 +123,7 @@ def evaluate_files(
 
 
 def likely_causes(
-    source: EpochSource, result: Evaluation, *, truth: Truth | None, accept: list[str] | tuple[()]
+    source: EpochSource, result: Evaluation, *, truth: Truth | None, accept: Sequence[str] = ()
 ) -> Causes | Refusal:
     """Causes of the events of a recording that was evaluated, unless it is too long for memory."""
     if result.epochs > MOST_EXPLAINED:

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from sbas.cli import inputs, output
-from sbas.cli.evaluation import print_verdict
+from sbas.cli.evaluation import likely_causes, print_verdict
 from sbas.exceptions import InputError
 from sbas.findings import Finding
 from sbas.input_check import CheckResult, check
@@ -175,7 +175,8 @@ def demo(
     )
     with output.progress("evaluating", quiet) as callback:
         evaluation = evaluate(source, truth=truth, progress=callback)
-    page = report(evaluation, out / "report.html")
+    causes = likely_causes(source, evaluation, truth=truth)
+    page = report(evaluation, out / "report.html", causes=causes)
     if json:
         output.print_json({"report": str(page), "recording": str(recording)})
         return
