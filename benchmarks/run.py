@@ -68,7 +68,7 @@ def year(folder: Path) -> None:
 
 
 def coverage(folder: Path) -> None:
-    subprocess.run([sys.executable, str(HERE / "coverage.py")], check=True)
+    subprocess.run([sys.executable, str(HERE / "counted_coverage.py")], check=True)
 
 
 CASES: tuple[Callable[[Path], None], ...] = (sbf, text, report, coverage, year)

@@ -16,9 +16,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sbas.estimate import Estimate
+from sbas.integrity.events import Stretch, find_runs
 from sbas.integrity.shares.block_bootstrap import share_estimate
 from sbas.integrity.shares.time_spans import Spans, spans_of_runs
-from sbas.integrity.events import Stretch, find_runs
 
 STEP_S, SPAN_S = 5.0, 3e5
 

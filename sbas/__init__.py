@@ -2,7 +2,8 @@
 
 The questions are functions: `read` a recording, `check` it, `evaluate` it against a truth,
 ask for its `failure_rate`, its `decorrelation` or a `k_factor`, `compare` two receivers,
-`simulate` a laboratory and write a `report`.
+`simulate` a laboratory and write a `report`; `receiver_states` of a recording feed a fault
+tree, which says how far one may `depend` on a localisation unit.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from sbas.truth import FixedPoint, Trajectory
 from sbas.version import __version__
 
 if TYPE_CHECKING:
+    from sbas.dependability import depend, load_models, receiver_states
     from sbas.integrity import (
         compare,
         decorrelation,
@@ -52,6 +54,7 @@ __all__ = [
     "check",
     "compare",
     "decorrelation",
+    "depend",
     "evaluate",
     "explain",
     "failure_rate",
@@ -59,11 +62,13 @@ __all__ = [
     "k_models",
     "k_verdict",
     "load_allocation",
+    "load_models",
     "plan_hours",
     "position_errors",
     "railway_hpl",
     "read",
     "read_truth_table",
+    "receiver_states",
     "repair",
     "report",
     "scan",
@@ -79,6 +84,7 @@ _LATER = {
         ),
         "sbas.integrity",
     ),
+    **dict.fromkeys(("depend", "load_models", "receiver_states"), "sbas.dependability"),
     "simulate": "sbas.laboratory",
     "report": "sbas.reporting",
 }  # fmt: skip

@@ -39,6 +39,7 @@ CODES: dict[str, str] = {
     "E25": "metadata missing, unreadable or contradicted",
     "E26": "values converted, or repaired on request, and counted",
     "E27": "more than one sampling rate",
+    "E28": "a model that may not say what its author means",
 }
 """Every finding code with its short title."""
 

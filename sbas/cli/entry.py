@@ -11,7 +11,7 @@ from typing import Annotated, NoReturn
 import typer
 
 import sbas
-from sbas.cli import comparing, evaluation, planning, processes, recordings
+from sbas.cli import comparing, evaluation, localisation, planning, processes, recordings
 from sbas.exceptions import SbasError
 
 app = typer.Typer(
@@ -25,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (recordings, evaluation, processes, comparing, planning):
+for module in (recordings, evaluation, processes, comparing, planning, localisation):
     module.register(app)
 
 

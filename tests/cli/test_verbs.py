@@ -287,6 +287,8 @@ def test_a_moving_recording_without_truth_gives_levels_but_no_rate(
         "plan",
         "decorrelation",
         "compare",
+        "states",
+        "depend",
     ],
 )
 def test_every_verb_has_help_with_an_example(capsys: pytest.CaptureFixture[str], verb: str) -> None:

@@ -1,6 +1,6 @@
 """Coverage of the demonstrated bound: 1000 simulated records with a known rate of failures.
 
-    python benchmarks/coverage.py [RECORDS]
+    python benchmarks/counted_coverage.py [RECORDS]
 
 Prints, for each true rate, how often the one-sided 95 % upper bound of the HMI rate holds the
 truth, its median width, and what counting epochs instead of events would have given.

@@ -1,0 +1,1 @@
+"""Exact solution of a hybrid fault tree: windows, modules, product chains."""

@@ -1,0 +1,1 @@
+"""Receiver states from recordings, and chains calibrated to published rows."""

@@ -1,0 +1,1 @@
+"""Independent simulation: slots, Petri nets, forced failures, agreement."""

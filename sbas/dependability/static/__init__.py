@@ -1,0 +1,1 @@
+"""Static fault trees: exact probability, cut sets and importance."""
