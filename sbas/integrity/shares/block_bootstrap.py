@@ -27,6 +27,8 @@ MIN_BLOCKS = 20
 """Fewer blocks give no bootstrap: choice of this package."""
 BLOCK_TAUS = 10.0
 REPLICATES = 2000
+_PLACES = 64
+"""Places a block length at which a block may begin."""
 _CHUNK = 1 << 21
 
 
@@ -275,22 +277,27 @@ def _bootstrap(
     """
     span, origin = _span_s(observed), int(observed.start_ns[0])
     count = math.ceil(span / block_s)
-    generator = np.random.default_rng(seed)
+    places = _PLACES * count
+    start = span * np.arange(places) / places
 
-    def within(spans: Spans, start: Floats) -> Floats:
+    def within(spans: Spans) -> Floats:
+        """(places,) time of the spans within the block that begins at each place."""
         end = start + block_s
         over = np.maximum(end - span, 0.0)
         cut = spans.until(np.minimum(end, span), origin) - spans.until(start, origin)
         return cut + spans.until(over, origin)
 
+    held_there = np.sum([sign * within(spans) for spans, sign in states], axis=0)
+    seen_there = within(observed)
+    generator = np.random.default_rng(seed)
     parts = []
     rows = max(_CHUNK // count, 1)
     for first in range(0, REPLICATES, rows):
-        start = generator.uniform(0.0, span, (min(rows, REPLICATES - first), count))
-        held = sum(sign * within(spans, start).sum(axis=1) for spans, sign in states)
-        seen = within(observed, start).sum(axis=1)
+        drawn = (min(rows, REPLICATES - first), count)
+        pick = generator.integers(0, places, drawn, dtype=np.int32)
+        held, seen = held_there[pick].sum(axis=1), seen_there[pick].sum(axis=1)
         # Blocks that all fall into gaps say nothing.
-        parts.append(np.asarray(held)[seen > 0] / seen[seen > 0])
+        parts.append(held[seen > 0] / seen[seen > 0])
     return np.concatenate(parts)
 
 

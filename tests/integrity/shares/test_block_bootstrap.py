@@ -125,8 +125,9 @@ def test_sides() -> None:
     two = estimate(share_estimate(state, whole(), tau_s=360, confidence=0.9))
     lower = estimate(share_estimate(state, whole(), tau_s=360, confidence=0.95, sided="lower"))
     upper = estimate(share_estimate(state, whole(), tau_s=360, confidence=0.95, sided="upper"))
-    assert (lower.lower, lower.upper) == (two.lower, None)
-    assert (upper.lower, upper.upper) == (None, two.upper)
+    assert lower.lower == pytest.approx(two.lower, rel=1e-12)
+    assert upper.upper == pytest.approx(two.upper, rel=1e-12)
+    assert lower.upper is upper.lower is None
 
 
 def test_nothing_observed_is_refused_and_wrong_arguments_are_errors() -> None:
