@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as json_format
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,11 +14,12 @@ from rich.markup import escape
 from rich.table import Table
 
 from sbas.cli import inputs, output
-from sbas.exceptions import InputError
+from sbas.estimate import Refusal
+from sbas.exceptions import InputError, SbasError
 from sbas.numerals import number
 
 if TYPE_CHECKING:
-    from sbas.dependability import ReceiverStates
+    from sbas.dependability import Dependability, ReceiverStates
     from sbas.dependability.exact.solution import Solution
     from sbas.dependability.simulation.agreement import Agreement
 
@@ -139,6 +141,7 @@ def depend(
         typer.Option(help="Of the rates of a Galileo file."),
     ] = None,
     top: Annotated[str | None, typer.Option(help="Top gate of an Open-PSA file.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
     json: output.Json = False,
 ) -> None:
     """How dependable is the localisation unit?
@@ -151,6 +154,9 @@ def depend(
     from sbas.dependability.questions import depend as depend_on
     from sbas.dependability.questions import static_answer
 
+    if report is not None:
+        given = [Path(model), *([] if receiver is None else [receiver])]
+        inputs.refuse_to_overwrite(report, given)
     loaded = load_any(
         model,
         environment=None if receiver is not None else environment,
@@ -163,6 +169,11 @@ def depend(
     )
     losses = None if loaded.losses is None else str(loaded.losses)
     if loaded.static is not None:
+        if report is not None:
+            raise InputError(
+                "a static tree has no report: its answer is one probability",
+                where="--report", cure="the same call without --report",
+            )  # fmt: skip
         plain = static_answer(loaded.static)
         if json:
             output.print_json({**plain, "losses": losses})
@@ -172,12 +183,13 @@ def depend(
             _print_losses(losses)
         return
     models = dict(loaded.models)
-    if receiver is not None:
+    states = None if receiver is None else _states_of(receiver)
+    if states is not None:
         first = next(iter(models.values()))
         models = {
             environment or "recording": with_receiver(
                 first,
-                _states_of(receiver),
+                states,
                 environment=environment,
                 semi_markov=semi_markov,
                 estimate=estimate,
@@ -190,17 +202,39 @@ def depend(
         seed=seed,
     )
     findings = list(dict.fromkeys([*loaded.findings, *answer.findings]))
+    page = None
+    if report is not None:
+        page = _write_report(replace(answer, findings=tuple(findings)), report, states)
     if json:
         output.print_json(
-            answer.to_dict() | {"findings": [f.to_dict() for f in findings], "losses": losses}
+            answer.to_dict()
+            | {"findings": [f.to_dict() for f in findings], "losses": losses}
+            | {"report": None if page is None else str(page)}
         )
     else:
         for name, solution in answer.solutions.items():
             _print_solution(solution, answer.agreements.get(name))
         output.print_findings(findings)
         _print_losses(losses)
+        if page is not None:
+            print(f"\nreport  {page}")
     if not answer.agrees:
         raise typer.Exit(1)
+
+
+def _write_report(answer: Dependability, path: Path, states: ReceiverStates | None) -> Path:
+    """The page; importance of one environment only, since it solves the model many times."""
+    from sbas.dependability.analysis.importance import Importances, importance
+    from sbas.reporting import dependability_report  # drawing is loaded only where used
+
+    found: Importances | Refusal | None = None
+    if len(answer.solutions) == 1:
+        (solution,) = answer.solutions.values()
+        try:
+            found = importance(solution.model)
+        except SbasError as error:
+            found = Refusal(error.what, error.cure or "another model")
+    return dependability_report(answer, path, states=states, importances=found)
 
 
 def _print_solution(solution: Solution, agreement: Agreement | None) -> None:

@@ -83,6 +83,8 @@ def kfactor(
         )
         _print_models(answer, json)
         return
+    if nugget or interval_s != 1.0:
+        raise typer.BadParameter("--nugget and --interval-s need --exposure-s and --tau-s")
     k = k_factor(
         risk, distribution=distribution, one_sided=one_sided, dim=dim, axis_ratio=axis_ratio
     )
@@ -110,8 +112,9 @@ def _print_models(answer: KModels, json: bool) -> None:
     if json:
         output.print_json(answer.to_dict())
         return
+    white = " with white noise" if "nugget" in answer.models else ""
     print(f"K = {answer.k:.6g} for a risk of {answer.risk:g} in {answer.exposure.exposure_s:g} s "
-          "(sampled Gauss-Markov errors)")  # fmt: skip
+          f"(sampled Gauss-Markov errors{white})")  # fmt: skip
     table = Table(box=box.SIMPLE, pad_edge=False)
     for head in ("model", "K", "effective samples at K", "risk of 6.18 in an hour", "errors are"):
         table.add_column(head, justify="left" if head in ("model", "errors are") else "right")

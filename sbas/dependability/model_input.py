@@ -164,5 +164,19 @@ def with_receiver(
     notes = [*kept, f"receiver {old.name}: {new.source}"]
     if states.rejected and not semi_markov:
         notes.append(f"receiver {old.name}: the recording shows {states.conclusion}")
+    if semi_markov:
+        notes.append(f"receiver {old.name}: {_longest_runs(states, environment)}")
     name = f"{model.name.partition(', ')[0]}, receiver of a recording"
     return replace(model, name=name, sources=(new,), notes=tuple(notes))
+
+
+def _longest_runs(states: ReceiverStates, environment: str | None) -> str:
+    """What a gate that counts longer runs than any that was seen can say, in words."""
+    longest = [
+        f"{name} {max((length for length, _ in (*runs.completed, *runs.censored)), default=0)}"
+        for name, runs in zip(STATES, states.chain_of(environment).runs, strict=True)
+    ]
+    return (
+        f"the longest runs seen last {', '.join(longest)} epochs: a gate that counts more is told "
+        "nothing by this recording, and a probability of 0 there means not seen"
+    )

@@ -30,14 +30,15 @@ class ErrorProcess:
     ----------
     decorrelation : how long errors stay correlated, or why that is not known.
     tail : fitted tail of the errors over sigma = HPL/K, or why there is none.
-    sigma_ratio : root mean square of the error along its major axis over sigma = HPL/K [1]; None
-        where no epoch has both.
+    sigma_ratio, pooled_ratio : root mean square of the error along its major axis, and over
+        both components, over sigma = HPL/K [1]; None where no epoch has both.
     k_of_mode : (m + 1,) K of each mode, the last where no mode is stated; NaN where unknown.
     """
 
     decorrelation: Decorrelation
     tail: TailFit | Refusal
     sigma_ratio: float | None
+    pooled_ratio: float | None
     k_of_mode: Floats
 
     @property
@@ -70,10 +71,10 @@ def error_process(
     """
     low, high = _CONFIDENCES
     if isinstance(grid, Refusal):
-        return ErrorProcess(Decorrelation("", grid, None, None, low), grid, None, k_of_mode)
+        return ErrorProcess(Decorrelation("", grid, None, None, low), grid, None, None, k_of_mode)
     found = decorrelation_of(grid.values, grid.step_s, confidence=min(max(confidence, low), high))
     sigma = _sigma_m(grid, k_of_mode)
-    ratio = _sigma_ratio(grid, sigma)
+    ratio, pooled = _sigma_ratios(grid, sigma)
     if lower_bound:
         tail: TailFit | Refusal = Refusal(
             "not modelled: errors against the recording's own median are only a lower bound",
@@ -83,7 +84,7 @@ def error_process(
         tail = Refusal("no epoch has both an error and a level with a known K")
     else:
         tail = _tail(grid, sigma, found)
-    return ErrorProcess(found, tail, ratio, k_of_mode)
+    return ErrorProcess(found, tail, ratio, pooled, k_of_mode)
 
 
 def _tail(grid: ErrorGrid, sigma: NDArray[np.float32], found: Decorrelation) -> TailFit | Refusal:
@@ -125,7 +126,9 @@ def _sigma_m(grid: ErrorGrid, k_of_mode: Floats) -> NDArray[np.float32]:
     return sigma
 
 
-def _sigma_ratio(grid: ErrorGrid, sigma: NDArray[np.float32]) -> float | None:
+def _sigma_ratios(
+    grid: ErrorGrid, sigma: NDArray[np.float32]
+) -> tuple[float, float] | tuple[None, None]:
     moments, known = np.zeros((2, 2)), 0
     for first in range(0, sigma.size, _CELLS_AT_ONCE):
         part = slice(first, first + _CELLS_AT_ONCE)
@@ -134,5 +137,6 @@ def _sigma_ratio(grid: ErrorGrid, sigma: NDArray[np.float32]) -> float | None:
         moments += scaled @ scaled.T
         known += scaled.shape[1]
     if known == 0:
-        return None
-    return math.sqrt(float(np.linalg.eigvalsh(moments / known)[-1]))
+        return None, None
+    major = float(np.linalg.eigvalsh(moments / known)[-1])
+    return math.sqrt(major), math.sqrt(float(np.trace(moments)) / known / 2)

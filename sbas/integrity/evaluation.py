@@ -36,6 +36,11 @@ from sbas.truth import FixedPoint, Truth
 
 Floats = NDArray[np.float64]
 
+LARGEST_LEVEL_M = 1e5
+"""No service gives levels from here on: receivers write such numbers for none."""
+MOST_MISSING = 0.01
+"""Share of epochs without a level, or without a position, above which a finding says so."""
+
 
 def evaluate(
     source: EpochSource,
@@ -115,9 +120,9 @@ def _own_median(checked: CheckResult) -> tuple[FixedPoint | None, Finding]:
     survey = checked.survey
     lat, lon, height = survey.median_position
     if not survey.static:
-        what = "no positions" if survey.positions == 0 else f"moving ({survey.extent_m:.3g} m)"
+        what = "has no positions" if survey.positions == 0 else f"moves ({survey.extent_m:.3g} m)"
         return None, Finding(
-            "E01", "warning", f"no truth, and the recording has {what}: no errors, no error rates",
+            "E01", "warning", f"no truth, and the recording {what}: no errors, no error rates",
             evidence="protection levels and availability are given",
             cure="--truth LAT,LON,HEIGHT or --truth TRAJECTORY.csv",
         )  # fmt: skip
@@ -138,7 +143,7 @@ def _k_of_mode(meta: RecordingMeta, tally: RecordTally) -> tuple[Floats, list[Fi
     names = (*MODES, "unknown")
     usual = max(range(len(names)), key=lambda i: tally.modes[names[i]])
     k = k_of_modes(meta.pl, -1 if names[usual] == "unknown" else usual)
-    levels = tally.levels.counts.sum(axis=1)
+    levels = tally.levels.result().counts.sum(axis=1)
     open_ = [i for i in (MODES.index("sbas"), -1) if np.isnan(k[i])]
     assumed = int(levels[open_].sum())
     if meta.pl.kind not in ("do229", "unknown") or not assumed:
@@ -169,10 +174,32 @@ def _remarks(
             Finding(
                 "E23",
                 "warning",
-                f"{tally.levels_left_out} epochs have a protection level outside SBAS mode or "
-                "declared invalid: counted as without level",
+                f"{tally.levels_left_out} epochs have a protection level outside SBAS mode, "
+                "declared invalid or infinite: counted as without level",
             )
         )
+    if hpl and hpl.max >= LARGEST_LEVEL_M:
+        found.append(
+            Finding(
+                "E23",
+                "warning",
+                f"protection levels of {LARGEST_LEVEL_M / 1000:g} km or more: a sentinel?",
+                evidence=f"largest HPL {hpl.max:.6g} m",
+                cure="make the values of the receiver's documentation for 'none' missing",
+            )
+        )
+    for name, number in (("level", hpl), ("position", None)):
+        have = tally.positions if number is None else number.epochs
+        if 0 < have < (1 - MOST_MISSING) * tally.epochs:
+            found.append(
+                Finding(
+                    "E10",
+                    "warning",
+                    f"{tally.epochs - have:,} of {tally.epochs:,} epochs have no {name}",
+                    evidence="they count as down; rates rest on the others",
+                    cure="record levels at the rate of positions, or evaluate one rate alone",
+                )
+            )
     if hpe and hpl and hpe.median > 10 * hpl.median:
         found.append(
             Finding(

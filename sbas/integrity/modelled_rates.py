@@ -44,11 +44,15 @@ def modelled_event_rate(
     """
     if isinstance(process.tail, Refusal):
         return process.tail
-    k, lower_m, upper_m, epochs = levels.by_k(process.k_of_mode)
-    level_k = k if kind == "mi" else alert_limit_m * k / upper_m
+    pairs = levels.by_k(process.k_of_mode)
+    level_k = pairs.k if kind == "mi" else alert_limit_m * pairs.k / pairs.upper_m
+    rises = pairs.fresh if kind == "mi" else pairs.rises
     if kind == "hmi":
-        level_k = np.where(lower_m < alert_limit_m, level_k, np.inf)
-    rate = modelled_rate(process.tail, level_k, counts=epochs, confidence=confidence)
+        level_k = np.where(pairs.lower_m < alert_limit_m, level_k, np.inf)
+        rises = pairs.rises_below(alert_limit_m)
+    rate = modelled_rate(
+        process.tail, level_k, counts=pairs.epochs, rises=rises, confidence=confidence
+    )
     if kind == "mi" or isinstance(rate, Refusal):
         return rate
     return replace(rate, caveats=(*rate.caveats, "errors are taken to grow as HPL does"))

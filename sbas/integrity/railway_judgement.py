@@ -29,7 +29,8 @@ class RailwayJudgement:
     ----------
     risk_per_h : target [1/h].
     models : K for it at the measured decorrelation time, under each process model.
-    as_claimed : verdict on 6.18 if the true sigma is what the levels claim, HPL/K.
+    as_claimed : verdict on 6.18 if errors measured as here had just the sigma that the levels
+        claim, HPL/K (ratio 1, with the sampling error of this record).
     as_seen : the same with the sigma that the errors had, or why it cannot be given.
     k : K for the target at the lower limit of tau, sampled Gauss-Markov with the white share of
         the record: the safe side of the measured process [1].
@@ -107,7 +108,7 @@ def railway_judgement(
     exposure = Exposure(HOUR_S, tau.value, step_s, nugget=white)
     safe = replace(exposure, tau_s=low)
 
-    def verdict(sigma_ratio: float) -> KVerdict:
+    def verdict(sigma_ratio: float, pooled_ratio: float | None = None) -> KVerdict:
         return k_verdict(
             risk_per_h,
             exposure,
@@ -115,6 +116,7 @@ def railway_judgement(
             tau_upper_s=high,
             record_s=recorded_s,
             sigma_ratio=sigma_ratio,
+            pooled_ratio=pooled_ratio,
         )
 
     k = exposure_k(risk_per_h, safe, model="nugget" if white > 0 else "ar1")
@@ -139,7 +141,9 @@ def railway_judgement(
     )
 
 
-def _as_seen(evaluation: Evaluation, verdict: Callable[[float], KVerdict]) -> KVerdict | Refusal:
+def _as_seen(
+    evaluation: Evaluation, verdict: Callable[[float, float | None], KVerdict]
+) -> KVerdict | Refusal:
     ratio = evaluation.process.sigma_ratio
     if evaluation.errors_are_lower_bound:
         return Refusal(
@@ -151,4 +155,4 @@ def _as_seen(evaluation: Evaluation, verdict: Callable[[float], KVerdict]) -> KV
     if ratio > LARGEST_RATIO:
         return Refusal(f"the errors are {ratio:.3g} times what the levels claim: no K of a "
                        "Gaussian error describes that")  # fmt: skip
-    return verdict(ratio)
+    return verdict(ratio, evaluation.process.pooled_ratio)

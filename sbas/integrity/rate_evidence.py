@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from sbas.estimate import Estimate, Quoted, Refusal
-from sbas.integrity.counting import poisson_bounds
+from sbas.integrity.counting import garwood_limits, poisson_bounds
 
 EventKind = Literal["hmi", "mi", "exceeds_al"]
 
@@ -111,6 +111,7 @@ def rate_evidence(
         if runs > 2 * events:
             caveats = (*caveats, f"{runs} runs of bad epochs were merged into {events} events")
         demonstrated = replace(demonstrated, caveats=(*demonstrated.caveats, *caveats))
+    modelled = _unless_contradicted(event, modelled, demonstrated, events, hours)
     claimed = _NO_CLAIM if event == "exceeds_al" else NPA_CLAIM
     return RateEvidence(
         event=event,
@@ -123,3 +124,30 @@ def rate_evidence(
         modelled=modelled,
         claimed=claimed,
     )
+
+
+_SURE = 0.999
+"""Confidence at which a count contradicts a model."""
+
+
+def _unless_contradicted(
+    event: EventKind,
+    modelled: Estimate | Refusal,
+    demonstrated: Estimate | Refusal,
+    events: int,
+    hours: float,
+) -> Estimate | Refusal:
+    """The modelled rate, unless the count of the same record says that it is wrong."""
+    if isinstance(modelled, Refusal) or isinstance(demonstrated, Refusal):
+        return modelled
+    lower, upper = (float(x) for x in garwood_limits(events, _SURE, sided="two"))
+    bound = modelled.value if modelled.upper is None else modelled.upper
+    # HMI is counted from the time to alert on: fewer than the model's are no contradiction.
+    too_many = event != "hmi" and modelled.value * hours > 3 * upper
+    if bound * hours < lower or too_many:
+        return Refusal(
+            f"the count contradicts the model: {events} events were seen where it expects "
+            f"{modelled.value * hours:.3g}, at most {bound * hours:.3g}",
+            "use the demonstrated bound; look for errors that do not grow as HPL does",
+        )
+    return modelled

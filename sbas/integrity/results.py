@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from sbas.integrity.railway_judgement import RailwayJudgement
 
 
+_LONGEST_S = 1e9
+
+
 @dataclass(frozen=True)
 class EvaluationSettings:
     """What an evaluation is asked; every default is echoed in its result.
@@ -67,8 +70,8 @@ class EvaluationSettings:
             raise InputError("an alert limit is given twice", evidence=f"got {limits}")
         for name in ("time_to_alert_s", "merge_s", "reset_s"):
             value = getattr(self, name)
-            if value is not None and not 0 <= value < math.inf:
-                raise InputError(f"{name} must be 0 s or more", evidence=f"{value}")
+            if value is not None and not 0 <= value <= _LONGEST_S:
+                raise InputError(f"{name} must be 0 s to {_LONGEST_S:g} s", evidence=f"{value}")
         checked_alpha(self.confidence)
 
 

@@ -97,7 +97,7 @@ class RecordTally:
         self._level_counts = np.zeros(len(LEVEL_GRID_M) + 1, np.int64)
         self._ratio_counts = np.zeros(self.RATIO_GRID.size + 1, np.int64)
         self._sums = np.zeros(5)
-        self.levels = LevelCounter()
+        self.levels = LevelCounter(self.max_step_ns)
         self.grid = self._grid(survey)
         self.strips = ThinnedSeries(survey.begin_ns, survey.end_ns, STRIPS, STRIP_BINS)
         self.scatter = DensityGrid()
@@ -121,18 +121,20 @@ class RecordTally:
         stretch = Stretch(batch.index.to_numpy().astype(np.int64), self.max_step_ns)
         covers = self._covered(stretch.time_ns)
         self.covered_ns += int(covers.sum())
-        left_out = left_out_levels(batch)
+        # A level without bound is none.
+        left_out = left_out_levels(batch) | np.isinf(batch["hpl_m"].to_numpy())
         hpl = np.where(left_out, np.nan, batch["hpl_m"].to_numpy())
-        vpl = np.where(left_out, np.nan, batch["vpl_m"].to_numpy())
+        vpl = batch["vpl_m"].to_numpy()
+        vpl = np.where(left_out | np.isinf(vpl), np.nan, vpl)
         self.levels_left_out += int(np.sum(left_out & ~np.isnan(batch["hpl_m"].to_numpy())))
         self.hpl.update(hpl)
         self.vpl.update(vpl)
         codes = mode_codes(batch)
-        self.levels.update(hpl, codes)
         # A missing mode has code -1, which the modulus turns into the last name, unknown.
         for name, count in zip(self.modes, np.bincount(codes % len(self.modes)), strict=False):
             self.modes[name] += int(count)
         fix = np.isfinite(batch["lat_deg"].to_numpy()) & np.isfinite(batch["lon_deg"].to_numpy())
+        self.levels.update(stretch.time_ns, np.where(fix, hpl, np.nan), codes)
         self._level_counts += np.bincount(
             np.searchsorted(LEVEL_GRID_M, hpl[fix & np.isfinite(hpl)], side="right"),
             minlength=self._level_counts.size,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 
+import numpy as np
 import pytest
 
 import sbas
@@ -12,6 +13,7 @@ from sbas.dependability import HybridFaultTree, ReceiverStates, depend, load_any
 from sbas.dependability.questions import static_answer
 from sbas.dependability.static.static_tree import BasicEvent, StaticGate, StaticTree
 from sbas.exceptions import InputError
+from sbas.recording import Recording
 from tests.plots.synthetic import TRUTH, synthetic_recording
 
 
@@ -90,6 +92,28 @@ def test_a_recording_takes_the_place_of_the_receiver(
     assert not any("calibrated" in note for note in model.notes)
     assert "urban" not in model.name
     assert depend(model).solutions[model.name].top.mean_unavailability > 0
+
+
+def test_a_semi_markov_receiver_says_how_long_the_longest_runs_were() -> None:
+    found = sbas.receiver_states(_three_states(), truth=TRUTH, threshold_m=5.0)
+    model = with_receiver(load_any("galoroi").models["urban"], found, semi_markov=True)
+    (note,) = (n for n in model.notes if "longest runs" in n)
+    assert "wrong 3" in note
+    assert "missing 2" in note
+    # No run of six wrong epochs was seen: CON 6 cannot become true, and the note says so.
+    answer = depend(model).solutions[model.name]
+    assert answer.rows["IE5"].mean_unavailability == 0.0
+
+
+def _three_states() -> Recording:
+    """Correct but for runs of 1 to 3 wrong epochs and of 1 to 2 without a position."""
+    recording = synthetic_recording(1200)
+    latitude = np.full(1200, TRUTH.lat_deg)
+    for k, start in enumerate(range(20, 1180, 20)):
+        latitude[start : start + 1 + k % 3] += 1e-3
+        latitude[start + 10 : start + 11 + k % 2] = np.nan
+    table = recording.table.assign(lat_deg=latitude, lon_deg=TRUTH.lon_deg)
+    return recording.replace(table=table)
 
 
 def test_states_pass_through_json(states: ReceiverStates) -> None:

@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbas.dependability.exact.gate_memory import GateMemory
-from sbas.dependability.exact.state_space import Columns, Ints, reachable, repeat_rows
+from sbas.dependability.exact.state_space import (
+    Columns,
+    Ints,
+    check_moves,
+    reachable,
+    repeat_rows,
+)
 from sbas.dependability.exact.transitions import Chain, trimmed
 
 
@@ -76,19 +82,21 @@ def product_chain(
         counts = chain.indptr[state + 1] - begin
         if absorbing is not None and not first:
             counts = np.where(truth_of(layer)[absorbing], 0, counts)
+        check_moves(int(counts.sum()), max_states=max_states, growth=growth)
         row, edge = repeat_rows(counts, begin)
         to = chain.targets[edge]
         known = {name: chain.truth[name][to] for name in reads}
         moved, _ = memory.step([cell[row] for cell in cells], known)
         return row, [to, *moved], [edge]
 
+    growth = memory.growth() or "components and sources"
     space = reachable(
         [parents, *entered],
         [chain.size, *memory.sizes.values()],
         expand,
         depth=chain.ends[-1],
         max_states=max_states,
-        growth=memory.growth() or "components and sources",
+        growth=growth,
     )
     (edge,) = space.payload
     start = np.zeros(len(space.columns[0]))

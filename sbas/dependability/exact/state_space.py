@@ -24,6 +24,8 @@ _INTERNED = 1 << 40
 
 MAX_STATES = 2_000_000
 """Beyond, a solution takes gigabytes and hours: other means are better."""
+MOVES_PER_STATE = 10
+"""Of the largest chain: each move takes some 40 bytes."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def reachable(
 
     Raises
     ------
-    InputError : more than `max_states` states.
+    InputError : more than `max_states` states, or 10 times as many moves.
 
     Notes
     -----
@@ -75,7 +77,7 @@ def reachable(
     encode = _Coder(sizes)
     number = {code: i for i, code in enumerate(encode(first).tolist())}
     layers, counts, targets, payloads = [first], [], [], []
-    layer, deep = first, 0
+    layer, deep, moves = first, 0, 0
     while len(layer[0]):
         if len(number) > max_states:
             raise _too_many(len(number), max_states, growth)
@@ -84,6 +86,8 @@ def reachable(
             break
         origin, moved, payload = expand(layer, deep == 0)
         counts.append(np.bincount(origin, minlength=len(layer[0])))
+        moves += len(origin)
+        check_moves(moves, max_states=max_states, growth=growth)
         found, at, back = np.unique(encode(moved), return_index=True, return_inverse=True)
         before = len(number)
         ids = np.array([number.setdefault(code, len(number)) for code in found.tolist()], int)
@@ -138,6 +142,23 @@ def _too_many(count: int, max_states: int, growth: str) -> InputError:
         cure="a longer step_s or shorter delays and counts; a structure whose parts share "
         "nothing (solved one by one); simulation; or a larger max_states",
     )
+
+
+def check_moves(moves: int, *, max_states: int, growth: str) -> None:
+    """Refuse what has few states but too many moves among them.
+
+    Raises
+    ------
+    InputError : more than 10 * `max_states` moves.
+    """
+    if moves > MOVES_PER_STATE * max_states:
+        raise InputError(
+            f"the exact solution needs more than {MOVES_PER_STATE * max_states} moves among states",
+            where=growth,
+            evidence=f"{moves} found before the end",
+            cure="fewer components that move at once in one part; simulation (simulate_model); or "
+            "a larger max_states",
+        )
 
 
 def check_bound(sizes: Sequence[int], *, max_states: int, growth: str) -> None:

@@ -32,9 +32,10 @@ class LookBack:
     ----------
     lag : L, epochs back.
     on : (S, K) expectation of each column at n from the state at n - L.
-    rise : (S,) probability of false at n - 1 and true at n, from the state at n - 1 - L.
+    rise : (S, F) probabilities of F pairs (n - 1, n), from the state at n - 1 - L: of false and
+        true; or, where the columns begin with C classes, of each pair of classes (F = C * C).
     early_on : (L, K) expectations at n = 0..L-1.
-    early_rise : (L,) probabilities of the rise at n = 1..L.
+    early_rise : (L, F) probabilities of the pairs at n = 1..L.
     """
 
     lag: int
@@ -56,14 +57,15 @@ Read = Callable[[Sequence[Bools]], Floats]
 """Truth (S,) of each run gate -> (S, K) what is expected."""
 
 
-def last_runs(chain: Chain, runs: Sequence[Run], read: Read) -> LookBack:
+def last_runs(chain: Chain, runs: Sequence[Run], read: Read, classes: int = 1) -> LookBack:
     """Any boolean function of the state and of runs (CON, DUR, causal AND) of it.
 
     Parameters
     ----------
     chain : with one stage.
     runs : whose truth the function reads.
-    read : first column: truth of the gate.
+    read : first column: truth of the gate; or the first `classes` columns: truth of classes.
+    classes : 1, or the number of classes, one of which holds.
 
     Returns
     -------
@@ -85,17 +87,35 @@ def last_runs(chain: Chain, runs: Sequence[Run], read: Read) -> LookBack:
     on = _at_last(runs, [read([np.full(chain.size, v == 1) for v in values])
                          for values in product(range(2), repeat=len(runs))], 2)  # fmt: skip
     then = {
-        values: matrix @ read([run.inside & v for run, v in zip(runs, values, strict=True)])[:, 0]
+        values: matrix
+        @ read([run.inside & v for run, v in zip(runs, values, strict=True)])[:, :classes]
         for values in product((False, True), repeat=len(runs))
     }
     rises = []
     for values in product(range(3), repeat=len(runs)):
-        before = read([np.full(chain.size, v == 2) for v in values])[:, 0]
-        rises.append(np.where(before > 0.0, 0.0, then[tuple(v >= 1 for v in values)])[:, None])
+        before = read([np.full(chain.size, v == 2) for v in values])[:, :classes]
+        rises.append(pairs_of(before, then[tuple(v >= 1 for v in values)]))
     lag = min(runs[0].length - 1, chain.ends[-1] + 1)
     late_on, early_on = _backwards(chain, matrix, runs, on, lag)
     late_rise, early_rise = _backwards(chain, matrix, runs, _at_last(runs, rises, 3), lag)
-    return LookBack(lag, late_on, late_rise[:, 0], early_on, early_rise[:, 0])
+    return LookBack(lag, late_on, late_rise, early_on, early_rise)
+
+
+def pairs_of(now: Floats, ahead: Floats) -> Floats:
+    """Pairs (an epoch, the next): of false and true, or of each two classes.
+
+    Parameters
+    ----------
+    now : (S, C) truth, 1 or 0.
+    ahead : (S, C) probability of truth at the next epoch.
+
+    Returns
+    -------
+    (S, 1) for C = 1, else (S, C * C), the class before first.
+    """
+    if now.shape[1] == 1:
+        return np.where(now > 0.0, 0.0, ahead)
+    return np.asarray((now[:, :, None] * ahead[:, None, :]).reshape(len(now), -1))
 
 
 def _at_last(runs: Sequence[Run], columns: list[Floats], values: int) -> Floats:
@@ -157,7 +177,7 @@ def _where_inside(run: Run, held: Floats, broken: Floats) -> Floats:
 
 
 def look_back(
-    product_: ProductChain, start: Floats, true: Bools, columns: Floats, lag: int
+    product_: ProductChain, start: Floats, columns: Floats, lag: int, classes: int = 1
 ) -> LookBack:
     """Any gate of bounded memory, by its product with the chain.
 
@@ -165,16 +185,18 @@ def look_back(
     ----------
     product_ : entered from every state of the smaller chain, memory empty before; one stage.
     start : (S,) law of the smaller chain at epoch 0.
-    true : over product states, truth of the gate.
-    columns : over product states, (states, K) what is expected at n beside the rise.
+    columns : over product states, (states, K) what is expected at n; first the truth of the
+        gate, or of the classes.
     lag : L, epochs that decide the gate.
+    classes : as for `last_runs`.
     """
     matrix = matrix_of(product_.chain)
-    rises = np.where(true, 0.0, matrix @ true.astype(float))
-    ahead = np.column_stack([columns, rises])
+    true = columns[:, :classes]
+    width = columns.shape[1]
+    ahead = np.hstack([columns, pairs_of(true, matrix @ true)])
     early = np.empty((lag, ahead.shape[1]))
     for n in range(lag):
         early[n] = start @ ahead[product_.entries]
         ahead = matrix @ ahead
     at = ahead[product_.entries]
-    return LookBack(lag, at[:, :-1], at[:, -1], early[:, :-1], early[:, -1])
+    return LookBack(lag, at[:, :width], at[:, width:], early[:, :width], early[:, width:])

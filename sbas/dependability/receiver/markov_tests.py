@@ -62,7 +62,8 @@ class MarkovTest:
             else f"{self.observed:g} seen, {self.expected:.4g} expected, "
         )
         df = "" if self.df is None else f", df {self.df}"
-        return f"{self.name}: {counts}statistic {self.statistic:.4g}{df}, p {self.p:.3g}"
+        p = f"p {self.p:.3g}" if self.p > 0 else "p below 1e-300"
+        return f"{self.name}: {counts}statistic {self.statistic:.4g}{df}, {p}"
 
 
 def order_test(triples: ArrayLike) -> MarkovTest | Refusal:

@@ -294,9 +294,9 @@ def _without_truth(static: bool, positions: int, extent_m: float) -> Finding:
             "E01", "info",
             "no truth: the recording's own median stands in; a constant has no part in tau",
         )  # fmt: skip
-    what = "no positions" if positions == 0 else f"moving ({extent_m:.3g} m)"
+    what = "has no positions" if positions == 0 else f"moves ({extent_m:.3g} m)"
     return Finding(
-        "E01", "warning", f"no truth, and the recording has {what}: no errors to correlate",
+        "E01", "warning", f"no truth, and the recording {what}: no errors to correlate",
         cure="--truth LAT,LON,HEIGHT or --truth TRAJECTORY.csv",
     )  # fmt: skip
 

@@ -165,8 +165,8 @@ class KModels:
 
     @property
     def k(self) -> float:
-        """K of the default model, "ar1"."""
-        return self.models["ar1"].k
+        """K of the sampled Gauss-Markov process: "ar1", with white noise "nugget"."""
+        return self.models["nugget" if "nugget" in self.models else "ar1"].k
 
     @property
     def per_sample_risk(self) -> float:

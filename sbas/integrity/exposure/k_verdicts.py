@@ -146,6 +146,7 @@ def k_verdict(
     record_s: float,
     k: float = PUBLISHED_K,
     sigma_ratio: float = 1.0,
+    pooled_ratio: float | None = None,
     components: int = 2,
     confidence: float = 0.95,
 ) -> KVerdict:
@@ -159,6 +160,9 @@ def k_verdict(
     record_s : length of the record that sigma was estimated from [s].
     k : K factor in question, 1 to 20.
     sigma_ratio : estimated sigma of the error over the sigma that K multiplies (HPL/K) [1].
+    pooled_ratio : where `sigma_ratio` is that of the major axis alone, the root mean square over
+        all components, at most as large [1]: its lower bound is one of the major axis too. None:
+        `sigma_ratio` itself is pooled, the axes are equal.
     components : number of components pooled in the estimate of sigma.
     confidence : of each one-sided bound of sigma.
 
@@ -185,6 +189,11 @@ def k_verdict(
     sigma = sigma_factors(
         record_s=record_s, tau_s=tau_upper_s, components=components, confidence=confidence
     )
+    if pooled_ratio is not None:
+        require("pooled_ratio", pooled_ratio, above=0, most=sigma_ratio)
+        # One axis has the samples of one component; the larger of two estimates errs upwards.
+        alone = sigma_factors(record_s=record_s, tau_s=tau_upper_s, confidence=confidence)
+        sigma = SigmaFactors(lower=pooled_ratio / sigma_ratio * sigma.lower, upper=alone.upper)
     worst, point, best = (
         min(k / (sigma_ratio * f), MAX_QUADRATURE_K) for f in (sigma.upper, 1.0, sigma.lower)
     )

@@ -27,6 +27,7 @@ MIN_BLOCKS = 20
 """Fewer blocks give no bootstrap: choice of this package."""
 BLOCK_TAUS = 10.0
 REPLICATES = 2000
+_STRETCHES = 1 << 14
 _PLACES = 64
 """Places a block length at which a block may begin."""
 _CHUNK = 1 << 21
@@ -54,7 +55,8 @@ def share_estimate(
     ----------
     inside : when the state held, such as the service being up; within `observed`.
     observed : when it could be seen.
-    tau_s : 1/e time of what drives the state [s]; its upper limit is the safe one.
+    tau_s : 1/e time of what drives the state [s], its upper limit; the state's own time, where
+        it is longer, takes its place.
     confidence : of the interval, in [0.5, 1).
     sided : "two", "lower" or "upper".
     interval_s : sampling interval [s]; a tau below it counts as the interval.
@@ -89,7 +91,8 @@ def share_estimate(
     if observed.total_s <= 0:
         return Refusal("no time was observed")
     outside = observed.without(inside)
-    tau_s = max(tau_s, interval_s)
+    state_tau = state_tau_s(inside, observed)
+    tau_s = max(tau_s, interval_s, 2 * state_tau)
     total, held = observed.total_s, inside.total_s
     value = held / total
     swapped = held > total / 2
@@ -99,7 +102,8 @@ def share_estimate(
     block_s = BLOCK_TAUS * max(tau_s, lasting_tau)
     blocks = _span_s(observed) / block_s
     caveats = []
-    if clusters >= MIN_CLUSTERS and m >= MIN_CLUSTERS / 2 and blocks >= MIN_BLOCKS:
+    enough = min(clusters, share * total / tau_s) >= MIN_CLUSTERS and m >= MIN_CLUSTERS / 2
+    if enough and blocks >= MIN_BLOCKS:
         ratios = _bootstrap(((inside, 1.0),), observed, block_s, seed)
         low_q, high_q = _widened(alpha, min(blocks, m))
         lower, upper = (float(x) for x in np.quantile(ratios, [low_q, high_q]))
@@ -114,7 +118,7 @@ def share_estimate(
             lower, upper = 1 - upper, 1 - lower
         caveats.append(
             f"binomial limits of {n:.4g} effective samples (T/tau, tau {tau_s:.6g} s, no more "
-            "than the clusters support): wide, on the safe side"
+            "than the clusters support)"
         )
         if clusters == 0:
             caveats.append("never seen: the bound holds for a state that lasts no longer than tau")
@@ -129,6 +133,44 @@ def share_estimate(
         sided,
         tuple(caveats),
     )
+
+
+def state_tau_s(inside: Spans, observed: Spans) -> float:
+    """Decorrelation time of a state itself [s]: what drives it may be slower than any error.
+
+    Parameters
+    ----------
+    inside, observed : when the state held, and when it could be seen.
+
+    Returns
+    -------
+    Integral of the state's autocorrelation up to its first zero; 0 for a state that never
+    changes. At a high level a slow process shows shorter stays than its own time, but they
+    come in groups, and those the integral sees.
+
+    Notes
+    -----
+    The share of each of 2^14 stretches of equal length (or of each shortest span, if longer) is
+    correlated by FFT, stretches without observation left out.
+    """
+    span, origin = _span_s(observed), int(observed.start_ns[0])
+    edges = np.linspace(0.0, span, _STRETCHES + 1)
+    seen = np.diff(observed.until(edges, origin))
+    known = seen > 0.5 * span / _STRETCHES
+    if not known.any():
+        return 0.0
+    held = np.where(known, np.diff(inside.until(edges, origin)) / np.where(known, seen, 1.0), 0.0)
+    centred = np.where(known, held - held[known].mean(), 0.0)
+    if not np.any(centred):
+        return 0.0
+    size = 2 * _STRETCHES
+    products = np.fft.irfft(np.abs(np.fft.rfft(centred, size)) ** 2)[: _STRETCHES // 2]
+    pairs = np.fft.irfft(np.abs(np.fft.rfft(known.astype(float), size)) ** 2)[: _STRETCHES // 2]
+    enough = np.rint(pairs) >= 1
+    r = np.where(enough, products / np.maximum(pairs, 1.0), 0.0)
+    r /= r[0]
+    stop = int(np.argmax(r <= 0)) if np.any(r <= 0) else r.size
+    return float((r[:stop].sum() - 0.5) * span / _STRETCHES)
 
 
 def share_difference(

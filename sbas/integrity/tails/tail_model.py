@@ -37,6 +37,7 @@ def modelled_rate(
     level_k: ArrayLike,
     *,
     counts: ArrayLike | None = None,
+    rises: ArrayLike | None = None,
     confidence: float = 0.95,
     sided: Sided = "upper",
 ) -> Estimate | Refusal:
@@ -48,6 +49,9 @@ def modelled_rate(
     level_k : level over sigma [1], one for all epochs or (m,) several: HPL/sigma for
         HPE >= HPL, AL/sigma for HPE >= AL; infinite where the event is impossible (HPL >= AL).
     counts : (m,) epochs at each level; None: one each.
+    rises : (m,) how often the chance rose to that of this level from one epoch to the next
+        (from a higher level, or from none), less how often it rose from it; None: never, the
+        level changes slowly or not at all.
     confidence : of the bound, in [0.5, 1).
     sided : "upper", "lower" or "two".
 
@@ -66,10 +70,11 @@ def modelled_rate(
     -----
     P(y) = 0.05 exp(-(y - u)/b), for an ellipse along the Hoyt tail; K_e with p(K_e) = P;
     rate = P h(K_e)/p(K_e), h the hazard of the sampled Gauss-Markov process, averaged over the
-    epochs. The bound takes the larger of two: the inversion of the estimator's distribution on
-    simulated records of the same length (at the upper tau), and a block bootstrap of count and
-    sum of the excesses (blocks of 10 tau); and the clock at the lower tau. The exponential's
-    block bootstrap alone covers 86 % of 95.
+    epochs; where the level itself comes down on an error that stays, at most the rise of the
+    chance is added (union bound). The bound takes the larger of two: the inversion of the
+    estimator's distribution on simulated records of the same length (at the upper tau), and a
+    block bootstrap of count and sum of the excesses (blocks of 10 tau); and the clock at the
+    lower tau. The exponential's block bootstrap alone covers 86 % of 95.
 
     References
     ----------
@@ -81,7 +86,7 @@ def modelled_rate(
         return fit
     if fit.refusal is not None:
         return fit.refusal
-    levels, weights, possible = _levels(level_k, counts)
+    levels, weights, risen, possible = _levels(level_k, counts, rises)
     if levels.size == 0:
         return Refusal("the event is impossible at every epoch: the level is above its limit")
     nodes = levels
@@ -95,11 +100,15 @@ def modelled_rate(
     def rate(v: Floats, tau_s: float) -> float:
         # Over y the fitted level is nearly a straight line.
         at = np.interp(levels**2, nodes**2, v)
+        seen = np.minimum(at, at.min() + _DEEPEST)
         log_hazard = log_hazards(
-            np.sqrt(2 * np.minimum(at, at.min() + _DEEPEST)), tau_s=tau_s,
-            interval_s=fit.interval_s, axis_ratio=fit.axis_ratio, nugget=fit.nugget,
+            np.sqrt(2 * seen), tau_s=tau_s, interval_s=fit.interval_s,
+            axis_ratio=fit.axis_ratio, nugget=fit.nugget,
         )  # fmt: skip
-        return 3600 * float(np.dot(weights, np.exp(log_hazard)))
+        per_s = np.exp(-tail_family(fit.axis_ratio).depth_at(seen)) / fit.interval_s
+        begun = float(np.dot(weights, np.exp(log_hazard)) + np.dot(risen, per_s))
+        # No more events begin than epochs exceed.
+        return 3600 * min(begun, float(np.dot(weights, per_s)))
 
     value = rate(value_v, fit.tau_s)
     decades = -math.log10(value * fit.hours) if value > 1e-290 else math.inf
@@ -154,8 +163,11 @@ def tail_probability(
 # --- level and bounds -------------------------------------------------------------------------
 
 
-def _levels(level_k: ArrayLike, counts: ArrayLike | None) -> tuple[Floats, Floats, float]:
-    """Distinct finite levels, the share of the epochs with each, and of all that have one."""
+def _levels(
+    level_k: ArrayLike, counts: ArrayLike | None, rises: ArrayLike | None
+) -> tuple[Floats, Floats, Floats, float]:
+    """Distinct finite levels; of the epochs the share with each, the share that rose to it, and
+    the share that has one."""
     level = np.atleast_1d(np.asarray(level_k, dtype=np.float64)).ravel()
     if level.size == 0 or np.isnan(level).any() or np.any(level < 0):
         raise InputError(
@@ -171,7 +183,12 @@ def _levels(level_k: ArrayLike, counts: ArrayLike | None) -> tuple[Floats, Float
     some = np.isfinite(level) & (epochs > 0)
     distinct, which = np.unique(level[some], return_inverse=True)
     shares = np.bincount(which, epochs[some], distinct.size) / epochs.sum()
-    return distinct, shares, float(epochs[some].sum() / epochs.sum())
+    risen = np.zeros(level.size) if rises is None else np.asarray(rises, dtype=np.float64).ravel()
+    if risen.shape != level.shape or not np.isfinite(risen).all():
+        raise InputError("rises are finite numbers, one a level", where="rises",
+                         evidence=f"{risen.size} rises for {level.size} levels")  # fmt: skip
+    rose = np.bincount(which, risen[some], distinct.size) / epochs.sum()
+    return distinct, shares, rose, float(epochs[some].sum() / epochs.sum())
 
 
 def _level_bounds(fit: TailFit, y: Floats, alpha: float) -> tuple[Floats, Floats, Floats]:

@@ -65,7 +65,10 @@ def _answer(found: Decorrelation, judged: RailwayJudgement | Refusal) -> Callout
     if isinstance(judged, Refusal):
         lines.append(f"Whether K = {PUBLISHED_K:g} is enough cannot be told: {judged}.")
         return Callout("warning", "K factor not judged", tuple(lines))
-    lines.append(f"If sigma is what the levels claim (HPL/K): {judged.as_claimed.verdict}")
+    lines.append(
+        "If errors measured as here had just the sigma that the levels claim (HPL/K): "
+        f"{judged.as_claimed.verdict}"
+    )
     seen = judged.as_seen
     lines.append(
         f"With the sigma of these errors, {number(seen.sigma_ratio)} of what the levels claim: "
@@ -130,7 +133,7 @@ def _verdicts(judged: RailwayJudgement) -> Table:
         rows,
         f"Target {number(judged.risk_per_h)} per hour. Tau from {number(claimed.tau_lower_s)} to "
         f"{number(claimed.tau_upper_s)} s; sigma from {number(claimed.sigma.lower)} to "
-        f"{number(claimed.sigma.upper)} of its estimate, each bound at "
+        f"{number(claimed.sigma.upper)} of its estimate (of one axis alone wider), each bound at "
         f"{100 * claimed.confidence:g} %. Gaussian errors.",
     )
 

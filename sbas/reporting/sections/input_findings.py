@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from sbas.dependability.questions import Dependability
 from sbas.integrity.results import Evaluation
 from sbas.reporting.content import Cell, Section, Tone, table
 
 _TONES: dict[str, Tone] = {"error": "bad", "warning": "warning", "info": ""}
 
 
-def section(evaluation: Evaluation) -> Section:
-    """Every finding of reader, input check and evaluation."""
+def section(evaluation: Evaluation | Dependability) -> Section:
+    """Every finding of reader, input check and evaluation, or of the check of models."""
     rows: list[tuple[Cell | str, ...]] = [
         (
             f.code, Cell(f.severity, _TONES[f.severity]), f.message,

@@ -31,7 +31,7 @@ def test_one_run_is_a_power_of_its_block(length: int) -> None:
     assert back.on[inside, 0] == pytest.approx(h, rel=1e-14)
     assert (back.on[~inside] == 0).all()
     entry = p[:, inside] @ h
-    assert back.rise == pytest.approx(np.where(inside, 0.0, entry), rel=1e-14)
+    assert back.rise[:, 0] == pytest.approx(np.where(inside, 0.0, entry), rel=1e-14)
     assert (back.early_on == 0).all()
     if length > 1:  # the run since epoch 0
         assert back.early_rise[-1] == pytest.approx(chain.start[inside] @ h, rel=1e-14)

@@ -194,7 +194,7 @@ def bad(kind: str) -> Recording:
         ("nothing", "E15", "no epoch"),
         ("repeated", "E05", "repeat"),
         ("backward", "E14", "backward"),
-        ("moving", "E01", "moving"),
+        ("moving", "E01", "moves"),
     ],
 )
 def test_bad_input_gives_findings_not_numbers(kind: str, code: str, word: str) -> None:

@@ -1,0 +1,1 @@
+"""What the figures of a hybrid fault tree mean: importance, sensitivity, uncertainty, sequences."""

@@ -1,0 +1,1 @@
+"""Tests of the analyses on top of the exact solution."""
