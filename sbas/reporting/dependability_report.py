@@ -12,10 +12,9 @@ from sbas.dependability.questions import Dependability
 from sbas.dependability.receiver.state_estimation import ReceiverStates
 from sbas.dependability.receiver.thinned_states import StateStrip
 from sbas.estimate import Refusal
-from sbas.exceptions import InputError
 from sbas.numerals import hours
 from sbas.reporting.content import Section
-from sbas.reporting.document import Report, render_html
+from sbas.reporting.document import Report, write_page
 from sbas.reporting.sections import (
     architectures,
     input_findings,
@@ -62,6 +61,7 @@ def dependability_report_of(
         "Dependability of " + (models[0].name if one else f"{len(models)} environments"),
         mission[0].upper() + mission[1:] if one else f"{', '.join(answer.solutions)}; {mission}",
         tuple(sections),
+        "Dependability report",
     )
 
 
@@ -93,19 +93,7 @@ def dependability_report(
     ------
     InputError : the file cannot be written.
     """
-    target = Path(path)
     document = dependability_report_of(
         answer, states=states, strip=strip, importances=importances, ladder=ladder
     )
-    try:
-        target.write_text(
-            render_html(document), encoding="utf-8", errors="backslashreplace", newline="\n"
-        )
-    except OSError as error:
-        raise InputError(
-            "the report cannot be written",
-            where=str(target),
-            evidence=error.strerror or str(error),
-            cure="name a file in a folder that exists and may be written to",
-        ) from error
-    return target
+    return write_page(document, path)

@@ -49,11 +49,12 @@ NOT_EXPLAINED = Refusal("sbas.explain was not asked", "sbas.report(..., causes=s
 
 @dataclass(frozen=True)
 class Report:
-    """A title, one line about what was evaluated, and the sections in their order."""
+    """A title, one line about what was evaluated, the sections in order, and the kind of report."""
 
     title: str
     subtitle: str
     sections: tuple[Section, ...]
+    kind: str = "Integrity report"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -118,8 +119,13 @@ def report(
     ------
     InputError : the file cannot be written.
     """
+    return write_page(report_of(evaluation, causes=causes), path)
+
+
+def write_page(document: Report, path: str | os.PathLike[str]) -> Path:
+    """Write a report as one HTML file; raises InputError where it cannot be written."""
     target = Path(path)
-    page = render_html(report_of(evaluation, causes=causes))
+    page = render_html(document)
     try:
         target.write_text(page, encoding="utf-8", errors="backslashreplace", newline="\n")
     except OSError as error:

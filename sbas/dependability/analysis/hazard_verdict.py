@@ -24,7 +24,8 @@ class HazardVerdict:
     rate_per_h : occurrences per hour [1/h].
     thr_per_h : tolerable hazard rate [1/h]; None where none was given.
     meets : whether the rate is below it; None where none was given.
-    sil : level whose band holds the rate; None for 1e-5/h and more.
+    sil : level whose band holds the rate; None for 1e-5/h and more, and for 0, where the model
+        excludes the hazard.
     text : the verdict in words.
     """
 
@@ -88,12 +89,16 @@ def rate_verdict(
             "a tolerable hazard rate is a number above 0", where="thr_per_h",
             evidence=repr(thr_per_h),
         )  # fmt: skip
-    sil = sil_band(rate_per_h)
+    sil: SilLevel | None = sil_band(rate_per_h)
     meets = None if thr_per_h is None else rate_per_h < thr_per_h
     text = f"{hazard}: {upward(rate_per_h)} occurrences per hour in the model"
     if thr_per_h is not None:
         text += f" {'meets' if meets else 'does not meet'} the THR of {thr_per_h:g}/h"
-    text += f"; in the band of SIL {sil}" if sil else "; no SIL (1e-05/h or more)"
+    if rate_per_h == 0:
+        # The model excludes it, which is a statement on the model and earns no level.
+        sil, text = None, f"{hazard}: never true in this model, which excludes it: no SIL follows"
+    else:
+        text += f"; in the band of SIL {sil}" if sil else "; no SIL (1e-05/h or more)"
     return HazardVerdict(hazard, float(rate_per_h), thr_per_h, meets, sil, text)
 
 

@@ -28,7 +28,8 @@ class SolutionRow:
         becomes true.
     method : how it was obtained: "chain" (read off the states), "window" (runs by powers of
         P_BB), "look-back" (product over as many epochs as the gates remember), "product"
-        (product over the mission), "modules" (independent parts put together).
+        (product over the mission), "modules" (independent parts put together), "doubling"
+        (squares of the transition matrix, for long missions).
     states : of the largest chain that was built for it.
     """
 

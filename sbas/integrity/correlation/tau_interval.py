@@ -37,7 +37,7 @@ STRETCHES = 8
 FEW_OUTLIERS = 0.01
 """A smaller share of averages lost to outliers is no gap: records then share a simulation."""
 SIMULATED_SAMPLES = 1 << 23
-FEWEST, MOST = 500, 4000
+FEWEST, MOST = 340, 4000
 """Simulated records for one true value, within a budget of samples."""
 LONGEST_TRUE = 10.0
 """True values up to this many record lengths are tried; beyond, nothing changes any more."""
