@@ -127,8 +127,8 @@ def depend(
         Literal["simulate"] | None,
         typer.Option(help="simulate: hold an independent simulation against the solution."),
     ] = None,
-    histories: Annotated[int, typer.Option(help="Of that simulation.")] = 40_000,
-    seed: Annotated[int, typer.Option(help="Of that simulation.")] = 20130701,
+    histories: Annotated[int, typer.Option(min=1, help="Of that simulation.")] = 40_000,
+    seed: Annotated[int, typer.Option(min=0, help="Of that simulation.")] = 20130701,
     parameter: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the model file."),
@@ -258,8 +258,8 @@ def _print_solution(solution: Solution, agreement: Agreement | None) -> None:
     for note in model.notes:
         print(f"note  {note}")
     if agreement is not None:
-        words = "agrees" if agreement.agrees else "DISAGREES, or nothing could be tested"
         tested = sum(c.verdict != "not tested" for c in agreement.comparisons)
+        words = "agrees" if agreement.agrees else "DISAGREES" if tested else "COULD TEST NOTHING"
         print(f"simulation of {agreement.histories:,} histories {words}: {tested} of "
               f"{len(agreement.comparisons)} figures tested, |z| below "
               f"{agreement.limit:.2f}")  # fmt: skip

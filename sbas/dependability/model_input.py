@@ -92,31 +92,55 @@ def load_any(
         parameters=parameters,
         override_rules=override_rules,
     )
+    changed = bool(parameters) or mission_s is not None
     models = {
-        name: replace(
-            model,
-            step_s=model.step_s if step_s is None else step_s,
-            mission_s=model.mission_s if mission_s is None else mission_s,
-        )
+        name: _retimed(model, step_s, mission_s, changed=changed)
         for name, model in file.models.items()
     }
     return LoadedModels(models, findings=file.findings)
 
 
+def _retimed(
+    model: HybridFaultTree, step_s: float | None, mission_s: float | None, *, changed: bool
+) -> HybridFaultTree:
+    """The model with another epoch or mission; what its notes say of its rows must stay true."""
+    if step_s is not None and step_s != model.step_s and model.sources:
+        raise InputError(
+            "the rows of a source belong to its epoch: another step would change their meaning",
+            where=f"sources.{model.sources[0].name}",
+            evidence=f"step {step_s:g} s, the file's {model.step_s:g} s",
+            cure="leave out the step, or write rows for the new epoch",
+        )
+    notes = model.notes
+    if changed:
+        notes = tuple(
+            f"{note}; with the file's own parameters and mission, not with those given here"
+            if "by construction" in note
+            else note
+            for note in notes
+        )
+    return replace(
+        model,
+        step_s=model.step_s if step_s is None else step_s,
+        mission_s=model.mission_s if mission_s is None else mission_s,
+        notes=notes,
+    )
+
+
 def _open_psa(
     path: Path, step_s: float | None, mission_s: float | None, top: str | None
 ) -> LoadedModels:
-    try:
-        imported = read_open_psa_model(
-            path, step_s=step_s or 1.0, mission_s=mission_s or 3600.0, top=top
-        )
-        if imported.model.components:
-            return LoadedModels({imported.model.name: imported.model}, losses=imported.report)
-    except ModelError:
-        # Weibull laws and common-cause groups: only their value at the mission's end is static.
-        pass
     tree = read_open_psa(path, mission_s=mission_s, top=top)
-    return LoadedModels({}, tree.tree, losses=tree.report)
+    if not any(loss.treatment == "flattened" for loss in tree.report.losses):
+        # Probabilities alone: nothing in it moves.
+        return LoadedModels({}, tree.tree, losses=tree.report)
+    try:
+        imported = read_open_psa_model(path, step_s=step_s, mission_s=mission_s, top=top)
+    except ModelError:
+        # Weibull laws and common-cause groups: only their value at the mission's end is static,
+        # which the report of losses says.
+        return LoadedModels({}, tree.tree, losses=tree.report)
+    return LoadedModels({imported.model.name: imported.model}, losses=imported.report)
 
 
 def with_receiver(

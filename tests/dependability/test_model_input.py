@@ -65,3 +65,33 @@ def test_what_is_no_model_says_so(tmp_path: Path) -> None:
     bomb.write_text('<!DOCTYPE x [<!ENTITY a "aaaa">]><opsa-mef>&a;</opsa-mef>')
     with pytest.raises(InputError):
         load_any(bomb)
+
+
+def test_another_step_would_change_what_the_rows_of_a_source_mean() -> None:
+    with pytest.raises(InputError, match="rows of a source"):
+        load_any("galoroi", environment="urban", step_s=0.5)
+    (same,) = load_any("galoroi", environment="urban", step_s=1.0).models.values()
+    assert same.step_s == 1.0
+
+
+def test_a_note_on_calibrated_rows_stays_true_under_other_parameters() -> None:
+    (plain,) = load_any("galoroi", environment="urban").models.values()
+    (other,) = load_any("galoroi", environment="urban", parameters={"k": 4}).models.values()
+    (note,) = (n for n in plain.notes if "by construction" in n)
+    (changed,) = (n for n in other.notes if "by construction" in n)
+    assert changed.startswith(note)
+    assert "not with those given here" in changed
+
+
+def test_rates_without_a_mission_ask_for_it(tmp_path: Path) -> None:
+    rate = tmp_path / "rate.xml"
+    rate.write_text(
+        '<opsa-mef><define-fault-tree name="t"><define-gate name="g"><or>'
+        '<basic-event name="a"/></or></define-gate></define-fault-tree><model-data>'
+        '<define-basic-event name="a"><exponential><float value="1e-3"/>'
+        "<system-mission-time/></exponential></define-basic-event></model-data></opsa-mef>"
+    )
+    with pytest.raises((InputError, ModelError), match="mission"):
+        load_any(rate)
+    loaded = load_any(rate, mission_s=3600.0, step_s=1.0)
+    assert [c.failure_rate_per_h for m in loaded.models.values() for c in m.components] == [1e-3]

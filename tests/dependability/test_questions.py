@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ import sbas
 from sbas.dependability import HybridFaultTree, ReceiverStates, depend, load_any, with_receiver
 from sbas.dependability.questions import static_answer
 from sbas.dependability.static.static_tree import BasicEvent, StaticGate, StaticTree
-from sbas.exceptions import InputError
+from sbas.dependability.tree.model import Component, Failed, Or
+from sbas.exceptions import InputError, ModelError
 from sbas.recording import Recording
 from tests.plots.synthetic import TRUTH, synthetic_recording
 
@@ -62,6 +64,36 @@ def test_simulation_agrees_and_its_seed_repeats(galoroi: dict[str, HybridFaultTr
     assert first.to_dict() == again.to_dict()
     (agreement,) = first.agreements.values()
     assert sum(c.verdict == "agrees" for c in agreement.comparisons) >= 10
+
+
+def test_simulation_of_one_component_without_repair_agrees() -> None:
+    """Nearly every forced history fails: what was not forced is no part of the comparison."""
+    model = HybridFaultTree(
+        "one", 1.0, 3600.0, (Component("c", 1e-3),), (), (Failed("f", "c"),), (), "f"
+    )
+    answer = depend(model, first_passage=True, simulate=20_000)
+    assert answer.agrees
+    # 1 - exp(-1e-3) over 3600 epochs of a second.
+    once = answer.solutions["one"].top.at_least_once
+    assert once == pytest.approx(-math.expm1(-1e-3), rel=1e-12)
+
+
+def test_gates_nested_too_deeply_are_refused_in_words() -> None:
+    gates = tuple(Or(f"g{i}", (f"g{i + 1}",)) for i in range(5000))
+    deep = HybridFaultTree(
+        "deep", 1.0, 10.0, (Component("c", 1e-3),), (), (Failed("f", "c"),),
+        (*gates, Or("g5000", ("f",))), "g0",
+    )  # fmt: skip
+    with pytest.raises(InputError, match="nested too deeply"):
+        depend(deep)
+
+
+def test_rates_beyond_any_hardware_are_refused() -> None:
+    model = HybridFaultTree(
+        "fast", 1.0, 10.0, (Component("c", 1e308, 1e308),), (), (Failed("f", "c"),), (), "f"
+    )
+    with pytest.raises(ModelError, match="out of range"):
+        depend(model)
 
 
 def test_fixed_probabilities_hold_throughout() -> None:

@@ -67,6 +67,27 @@ def solve(
     more than a million epochs are summed by doubling (`long_missions`), unless curves are asked
     for or a source has stages.
     """
+    try:
+        return _solved(
+            model, first_passage=first_passage, curve=curve, names=names, max_states=max_states
+        )
+    except RecursionError as error:
+        raise InputError(
+            "gates are nested too deeply for this solver",
+            where="gates",
+            evidence=f"{len(model.gates)} gates",
+            cure="join gates of one kind; a static tree of any depth is solved from Open-PSA",
+        ) from error
+
+
+def _solved(
+    model: HybridFaultTree,
+    *,
+    first_passage: bool,
+    curve: bool,
+    names: Iterable[str] | None,
+    max_states: int,
+) -> Solution:
     findings = check_model(model)
     known = [thing.name for kind in (model.events, model.gates) for thing in kind]
     wanted = known if names is None else list(dict.fromkeys(names)) or [model.top]

@@ -132,7 +132,7 @@ def steady_state(
             share, rate = float(law @ back.on[:, 0]), float(law @ back.rise[:, 0])
             rows[name] = SteadyRow(
                 name,
-                share,
+                min(share, 1.0),
                 rate * 3600.0 / model.step_s,
                 share / rate * model.step_s if rate > 0.0 else None,
                 states,

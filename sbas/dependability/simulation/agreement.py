@@ -236,6 +236,7 @@ def _compare(
             verdict = "disagrees"
     elif len(scales) == 1:
         others = sum(_others(row, measure, simulation))
-        if 1.0 - exact > coarsest * _most(others, level):
+        # Histories outside the one stratum were not simulated: they are no part of its rest.
+        if simulation.strata[0].weight - exact > coarsest * _most(others, level):
             verdict = "disagrees"
     return Comparison(row.name, measure, exact, value, error, z, hits, bound, verdict)

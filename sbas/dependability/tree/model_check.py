@@ -43,6 +43,9 @@ from sbas.exceptions import ModelError
 from sbas.findings import Finding
 from sbas.integrity.allocation_tree import nearest
 
+_FASTEST_PER_H = 1e12
+"""No hardware fails or is repaired faster; sums of such rates stay far from overflow."""
+
 
 def check_model(model: HybridFaultTree) -> tuple[Finding, ...]:
     """Refuse a model that means nothing, and tell what in it has no effect.
@@ -69,8 +72,8 @@ def check_model(model: HybridFaultTree) -> tuple[Finding, ...]:
     names = _check_names(model)
     for component in model.components:
         where = f"components.{component.name}"
-        a_number(component.failure_rate_per_h, f"{where}.failure_rate_per_h")
-        a_number(component.repair_rate_per_h, f"{where}.repair_rate_per_h")
+        a_number(component.failure_rate_per_h, f"{where}.failure_rate_per_h", high=_FASTEST_PER_H)
+        a_number(component.repair_rate_per_h, f"{where}.repair_rate_per_h", high=_FASTEST_PER_H)
         a_number(component.initially_failed, f"{where}.initially_failed", high=1.0)
         a_text(component.source, f"{where}.source")
     for source in model.sources:
