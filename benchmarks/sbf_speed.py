@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from sbas.logs.sbf_writer import write
+from sbas.logs.septentrio.sbf_writer import write
 from sbas.recording import Recording, mode_categories
 
 EPOCHS = 300_000
@@ -30,7 +30,7 @@ TARGET_PER_S = 1.5e6
 READ = """
 import resource, sys
 from pathlib import Path
-from sbas.logs.septentrio_sbf import read
+from sbas.logs.septentrio.septentrio_sbf import read
 recording = read(Path(sys.argv[1]))
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
 print(len(recording), len(recording.side_tables["sbas_frames"]), peak)

@@ -12,7 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sbas.logs import delimited_text, parquet, rtklib_pos
+from sbas.logs.arrow import parquet
+from sbas.logs.delimited import delimited_text
+from sbas.logs.rtklib import rtklib_pos
 from sbas.recording import Recording
 
 ROWS = 2_000_000

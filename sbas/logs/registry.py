@@ -24,9 +24,12 @@ import pyarrow as pa
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.logs import delimited_text, parquet, rtklib_pos, septentrio_sbf
+from sbas.logs.arrow import parquet
+from sbas.logs.delimited import delimited_text
 from sbas.logs.format import Format, Match, Progress
 from sbas.logs.not_read import unread_format
+from sbas.logs.rtklib import rtklib_pos
+from sbas.logs.septentrio import septentrio_sbf
 from sbas.recording import EpochSource, Recording, RecordingMeta, Source, with_columns
 from sbas.timescales import TimeScale
 

@@ -13,12 +13,12 @@ import pandas as pd
 import pyarrow.parquet as pq
 
 from sbas.exceptions import InputError
-from sbas.logs import delimited_text
-from sbas.logs.column_map import MappedTable, geoid_unused
-from sbas.logs.column_names import TRUTH_COLUMNS
-from sbas.logs.parquet import opened, read
-from sbas.logs.parquet_foreign import map_foreign
-from sbas.logs.parquet_writer import META_KEY
+from sbas.logs.arrow.parquet import opened, read
+from sbas.logs.arrow.parquet_foreign import map_foreign
+from sbas.logs.arrow.parquet_writer import META_KEY
+from sbas.logs.delimited import delimited_text
+from sbas.logs.delimited.column_map import MappedTable, geoid_unused
+from sbas.logs.delimited.column_names import TRUTH_COLUMNS
 from sbas.timescales import TimeScale
 
 POSITION = ("lat_deg", "lon_deg", "height_m")

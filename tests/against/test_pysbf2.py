@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sbas.logs.sbf_writer import write
-from sbas.logs.septentrio_sbf import read
-from tests.logs.sbf_samples import recording
+from sbas.logs.septentrio.sbf_writer import write
+from sbas.logs.septentrio.septentrio_sbf import read
+from tests.logs.septentrio.sbf_samples import recording
 
 pysbf2 = pytest.importorskip("pysbf2", reason="pysbf2 is the peer of this test")
 
@@ -39,7 +39,7 @@ def absent(value: float, *missing: float) -> float:
 
 
 def test_field_by_field(file: Path) -> None:
-    """RAIMStatistics 4011 is unknown to pysbf2; tests/logs/test_sbf_writer.py has it."""
+    """RAIMStatistics 4011 is unknown to pysbf2; tests/logs/septentrio/test_sbf_writer.py has it."""
     ours = read(file)
     by_kind: dict[str, list[object]] = {}
     for _, parsed in pysbf2.SBFReader(BytesIO(file.read_bytes()), quitonerror=0):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sbas.logs import parquet
+from sbas.logs.arrow import parquet
 from tests.cli.test_verbs import Answer
 from tests.plots.synthetic import synthetic_recording
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sbas.cli import main
-from sbas.logs import parquet
+from sbas.logs.arrow import parquet
 from sbas.recording import Recording
 from tests.examples import quiet, recording
 

@@ -17,8 +17,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sbas.exceptions import InputError
-from sbas.logs import delimited_text, parquet, registry, rtklib_pos, septentrio_sbf
+from sbas.logs import registry
+from sbas.logs.arrow import parquet
+from sbas.logs.delimited import delimited_text
 from sbas.logs.format import Format, Match
+from sbas.logs.rtklib import rtklib_pos
+from sbas.logs.septentrio import septentrio_sbf
 from sbas.recording import Recording
 
 # A DOP block of pysbf2's tests (methods page, section 11): HPL 3.889 m, VPL 5.675 m.

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from sbas.exceptions import InputError
-from sbas.logs import parquet
+from sbas.logs.arrow import parquet
 from sbas.logs.truth_files import read_truth_table
 from sbas.recording import Recording
 

@@ -16,7 +16,7 @@ import sbas
 from sbas.estimate import Estimate, Refusal
 from sbas.integrity.correlation.correlation import decorrelation, decorrelation_of
 from sbas.integrity.correlation.decorrelation_results import Decorrelation
-from sbas.logs import parquet_writer
+from sbas.logs.arrow import parquet_writer
 from sbas.recording import Recording
 from tests.examples import POINT, recording
 

@@ -16,9 +16,9 @@ import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
 from sbas.exceptions import InputError
-from sbas.logs import sbf_blocks as sbf
 from sbas.logs.checksums import crc16_of_rows
 from sbas.logs.format import Progress
+from sbas.logs.septentrio import sbf_blocks as sbf
 from sbas.recording import MODES, Flag, Recording, with_columns
 from sbas.timescales import week_and_tow_ns
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbas.logs.checksums import crc24q_of_rows
-from sbas.logs.sbf_blocks import SYNC
-from sbas.logs.sbf_framing import HEADER_BYTES, MIN_LENGTH, read_span
+from sbas.logs.septentrio.sbf_blocks import SYNC
+from sbas.logs.septentrio.sbf_framing import HEADER_BYTES, MIN_LENGTH, read_span
 
 PIECE_BYTES = 4 << 20
 _LONGEST_FRAME = 1030

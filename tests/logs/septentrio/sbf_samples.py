@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from sbas.logs.sbf_writer import encode_blocks
+from sbas.logs.septentrio.sbf_writer import encode_blocks
 from sbas.recording import COLUMNS, Recording, mode_categories
 
 WEEK = 1549

@@ -22,16 +22,16 @@ import pyarrow.parquet as pq
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.logs.format import Format, Match, Progress
-from sbas.logs.parquet_foreign import read_foreign
-from sbas.logs.parquet_tables import (
+from sbas.logs.arrow.parquet_foreign import read_foreign
+from sbas.logs.arrow.parquet_tables import (
     count_impossible_levels,
     impossible_levels,
     one_array,
     refuse_memory,
     words,
 )
-from sbas.logs.parquet_writer import LAYOUT_KEY, META_KEY, TIME_TYPE, Layout, sha256_of, write
+from sbas.logs.arrow.parquet_writer import LAYOUT_KEY, META_KEY, TIME_TYPE, Layout, sha256_of, write
+from sbas.logs.format import Format, Match, Progress
 from sbas.logs.sentinels import sentinel_findings
 from sbas.recording import (
     BATCH_ROWS,

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from sbas.logs.checksums import crc16_of_rows, crc16_of_spans
 from sbas.logs.format import Progress
-from sbas.logs.sbf_blocks import MAX_LENGTH
+from sbas.logs.septentrio.sbf_blocks import MAX_LENGTH
 
 CHUNK_BYTES = 4 << 20
 HEADER_BYTES = 8

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sbas.logs import sbf_blocks as sbf
+from sbas.logs.septentrio import sbf_blocks as sbf
 from sbas.recording import MODES, Flag
 
 Floats = NDArray[np.float64]

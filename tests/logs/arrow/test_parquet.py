@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from sbas.exceptions import InputError
 from sbas.findings import Finding
 from sbas.laboratory import simulate
-from sbas.logs import parquet, parquet_writer
+from sbas.logs.arrow import parquet, parquet_writer
 from sbas.recording import (
     COLUMNS,
     MODES,

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sbas.exceptions import InputError
-from sbas.logs import rtklib_pos
+from sbas.logs.rtklib import rtklib_pos
 from sbas.recording import Flag, Recording
 
 FRAME = "% (lat/lon/height=WGS84/ellipsoidal,Q=1:fix,2:float,3:sbas,4:dgps,5:single,6:ppp,ns=#)\n"

@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sbas.findings import Finding
-from sbas.logs import septentrio_sbf
-from sbas.logs.sbf_writer import write
-from sbas.logs.septentrio_sbf import FORMAT, read, read_in_chunks, sniff
+from sbas.logs.septentrio import septentrio_sbf
+from sbas.logs.septentrio.sbf_writer import write
+from sbas.logs.septentrio.septentrio_sbf import FORMAT, read, read_in_chunks, sniff
 from sbas.recording import Flag, Recording, major_semi_axis_m
-from tests.logs.sbf_samples import WEEK, block, opaque_block, recording
+from tests.logs.septentrio.sbf_samples import WEEK, block, opaque_block, recording
 
 DOP_REAL = bytes.fromhex("244057f9a10f2000e052c91c3f0925004f0028002c004200f5e77840fc96b540")
 RTCM_1005 = bytes.fromhex("d300133ed7d30202980edeef34b4bd62ac0941986f33360b98")
@@ -325,7 +325,7 @@ class TestVersion1:
         assert r.meta.pl.kind == "unknown"  # version 1 does not tell the signals
 
     def test_older_block_without_its_last_fields(self, load) -> None:  # type: ignore[no-untyped-def]
-        from sbas.logs.sbf_writer import encode_blocks
+        from sbas.logs.septentrio.sbf_writer import encode_blocks
 
         rows = encode_blocks(
             5904, 0, {"week": WEEK, "tow_ms": 0, "mode": 1, "lat": 0.5, "lon": 1.0}, length=72
@@ -341,7 +341,7 @@ class TestVersion1:
 
 
 def test_unknown_revision_and_length_are_read_by_what_they_hold(load) -> None:  # type: ignore[no-untyped-def]
-    from sbas.logs.sbf_writer import encode_blocks
+    from sbas.logs.septentrio.sbf_writer import encode_blocks
 
     stamp = {"week": WEEK, "mode": 1, "lat": 0.5, "lon": 1.0, "h_accuracy": 150}
     later = encode_blocks(4007, 5, {**stamp, "tow_ms": 0}, length=120)
@@ -372,7 +372,7 @@ class TestJoin:
 
     @pytest.mark.parametrize("lost", range(5))
     def test_each_missing_block_marks_its_epoch(self, load, lost: int) -> None:  # type: ignore[no-untyped-def]
-        from tests.logs.sbf_samples import reference_blocks
+        from tests.logs.septentrio.sbf_samples import reference_blocks
 
         blocks = [whole for _, _, whole in reference_blocks(epoch(1000))]
         r = load(epoch(0), *(b for i, b in enumerate(blocks) if i != lost), epoch(2000))
@@ -407,7 +407,7 @@ class TestJoin:
 
     def test_two_logs_in_one_file_do_not_mix(self, load) -> None:  # type: ignore[no-untyped-def]
         """The first log lost its DOP block; the second's must not join the first's position."""
-        from tests.logs.sbf_samples import reference_blocks
+        from tests.logs.septentrio.sbf_samples import reference_blocks
 
         first = b"".join(w for _, n, w in reference_blocks(epoch(1000, lat=0.1)) if n != 4001)
         r = load(epoch(0, lat=0.1), first, epoch(0, lat=0.2, hpl=20), epoch(1000, lat=0.2, hpl=21))
@@ -532,7 +532,7 @@ class TestLeftovers:
     def test_long_foreign_stretch_is_read_piece_by_piece(
         self, load, monkeypatch: pytest.MonkeyPatch
     ) -> None:  # type: ignore[no-untyped-def]
-        monkeypatch.setattr("sbas.logs.sbf_foreign.PIECE_BYTES", 3000)
+        monkeypatch.setattr("sbas.logs.septentrio.sbf_foreign.PIECE_BYTES", 3000)
         r = load(epoch(0), NMEA * 500, b"!" * 7, NMEA * 300, epoch(1000), NMEA * 3)
         assert finding(r, "E24").evidence.startswith("7 of ")
         assert "803 NMEA" in finding(r, "E24").evidence

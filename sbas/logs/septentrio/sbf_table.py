@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sbas.logs import sbf_blocks as sbf
-from sbas.logs import sbf_decode as decode
-from sbas.logs.column_map import pl_outside_sbas
-from sbas.logs.sbf_epochs import Epochs
+from sbas.logs.delimited.column_map import pl_outside_sbas
+from sbas.logs.septentrio import sbf_blocks as sbf
+from sbas.logs.septentrio import sbf_decode as decode
+from sbas.logs.septentrio.sbf_epochs import Epochs
 from sbas.recording import COLUMNS, MODES, SBAS_MODES, Flag, missing_values, mode_categories
 
 Raw = dict[str, NDArray[Any]]

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sbas.logs.sbf_framing import Frames, frame, scan
-from sbas.logs.sbf_writer import write
-from tests.logs.sbf_samples import block, opaque_block, recording, reference_blocks
+from sbas.logs.septentrio.sbf_framing import Frames, frame, scan
+from sbas.logs.septentrio.sbf_writer import write
+from tests.logs.septentrio.sbf_samples import block, opaque_block, recording, reference_blocks
 
 NMEA = b"$GPGGA,093000.00,5002.0700,N,01546.2720,E,2,08,1.1,245.3,M,44.5,M,3.0,0120*47\r\n"
 

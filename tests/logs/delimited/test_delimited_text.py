@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sbas.exceptions import InputError
-from sbas.logs import delimited_text
+from sbas.logs.delimited import delimited_text
 from sbas.recording import MODES, Flag, Recording
 
 T = "2025-05-23 14:09:1"

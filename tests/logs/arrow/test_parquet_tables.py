@@ -12,8 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from sbas.exceptions import InputError
-from sbas.logs import parquet, parquet_tables
-from sbas.logs.parquet_writer import META_KEY
+from sbas.logs.arrow import parquet, parquet_tables
+from sbas.logs.arrow.parquet_writer import META_KEY
 from sbas.recording import Flag, Recording, RecordingMeta
 
 ROWS = 4

@@ -14,8 +14,16 @@ import pyarrow.parquet as pq
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.logs.column_map import MappedTable, convert_columns
-from sbas.logs.column_names import (
+from sbas.logs.arrow.parquet_tables import (
+    is_number,
+    is_text,
+    one_array,
+    read_columns,
+    value_type,
+    words,
+)
+from sbas.logs.delimited.column_map import MappedTable, convert_columns
+from sbas.logs.delimited.column_names import (
     TIME_CURE,
     MappedColumn,
     applied_geoid,
@@ -26,14 +34,6 @@ from sbas.logs.column_names import (
     no_level_finding,
 )
 from sbas.logs.format import Progress
-from sbas.logs.parquet_tables import (
-    is_number,
-    is_text,
-    one_array,
-    read_columns,
-    value_type,
-    words,
-)
 from sbas.logs.time_stamps import (
     Stamps,
     parse_stamps,

@@ -17,14 +17,14 @@ import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from sbas.logs import sbf_blocks as sbf
-from sbas.logs import sbf_decode as decode
-from sbas.logs import sbf_report as report
 from sbas.logs.format import Format, Match, Progress
-from sbas.logs.sbf_epochs import Stamps, join
-from sbas.logs.sbf_framing import CHUNK_BYTES, Frames, frame, scan
-from sbas.logs.sbf_table import KINDS, Raw, empty_column, fill_table
-from sbas.logs.sbf_writer import write
+from sbas.logs.septentrio import sbf_blocks as sbf
+from sbas.logs.septentrio import sbf_decode as decode
+from sbas.logs.septentrio import sbf_report as report
+from sbas.logs.septentrio.sbf_epochs import Stamps, join
+from sbas.logs.septentrio.sbf_framing import CHUNK_BYTES, Frames, frame, scan
+from sbas.logs.septentrio.sbf_table import KINDS, Raw, empty_column, fill_table
+from sbas.logs.septentrio.sbf_writer import write
 from sbas.recording import Recording, RecordingMeta
 from sbas.timescales import GPS_EPOCH_NS, WEEK_S
 

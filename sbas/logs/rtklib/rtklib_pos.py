@@ -18,8 +18,14 @@ import pandas as pd
 
 from sbas.exceptions import InputError
 from sbas.logs.format import Format, Match, Progress
-from sbas.logs.rtklib_columns import FloatArray, epoch_columns, protection_level_meta
-from sbas.logs.rtklib_layout import COLUMN_HEADER, Layout, fit_rows, header_text, parse_header
+from sbas.logs.rtklib.rtklib_columns import FloatArray, epoch_columns, protection_level_meta
+from sbas.logs.rtklib.rtklib_layout import (
+    COLUMN_HEADER,
+    Layout,
+    fit_rows,
+    header_text,
+    parse_header,
+)
 from sbas.logs.text_input import (
     TextBlocks,
     bad_line_finding,

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from sbas.exceptions import InputError
-from sbas.logs.sbf_writer import STRIP_EPOCHS, encode_blocks, write
-from sbas.logs.septentrio_sbf import FILLED, read
+from sbas.logs.septentrio.sbf_writer import STRIP_EPOCHS, encode_blocks, write
+from sbas.logs.septentrio.septentrio_sbf import FILLED, read
 from sbas.recording import MODES, Flag, Recording, mode_categories
-from tests.logs.sbf_samples import recording, reference_blocks
+from tests.logs.septentrio.sbf_samples import recording, reference_blocks
 
 HUNDREDTH = ("hdop", "vdop", "pdop", "correction_age_s")
 SINGLE = ("hpl_m", "vpl_m", "vel_e_mps", "vel_n_mps", "vel_u_mps", "herl_m", "verl_m",

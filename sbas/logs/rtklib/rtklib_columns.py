@@ -10,8 +10,8 @@ import pymap3d
 from numpy.typing import NDArray
 
 from sbas.findings import Finding
-from sbas.logs.column_map import ellipsoidal, geoid_unused, pl_outside_sbas
-from sbas.logs.rtklib_layout import Layout
+from sbas.logs.delimited.column_map import ellipsoidal, geoid_unused, pl_outside_sbas
+from sbas.logs.rtklib.rtklib_layout import Layout
 from sbas.logs.sentinels import remove_sentinels, sentinel_findings
 from sbas.recording import (
     MODES,

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.logs.column_map import MappedTable, convert_columns, word_findings
-from sbas.logs.column_names import (
+from sbas.logs.delimited.column_map import MappedTable, convert_columns, word_findings
+from sbas.logs.delimited.column_names import (
     TIME_CURE,
     TIME_PARTS,
     applied_geoid,
@@ -29,8 +29,8 @@ from sbas.logs.column_names import (
     map_text,
     no_level_finding,
 )
-from sbas.logs.delimited_layout import Layout, data_rows, find_layout, split_line
-from sbas.logs.delimited_lines import LineReader, Part
+from sbas.logs.delimited.delimited_layout import Layout, data_rows, find_layout, split_line
+from sbas.logs.delimited.delimited_lines import LineReader, Part
 from sbas.logs.format import Format, Match, Progress
 from sbas.logs.text_input import (
     BAD_SHARE,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from sbas.exceptions import InputError
-from sbas.logs.column_names import (
+from sbas.logs.delimited.column_names import (
     TIME_PARTS,
     TRUTH_COLUMNS,
     known_names,

@@ -12,13 +12,13 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
-from sbas.logs.column_names import (
+from sbas.logs.delimited.column_names import (
     TIME_PARTS,
     MappedColumn,
     map_headers,
     needed_columns,
 )
-from sbas.logs.delimited_layout import (
+from sbas.logs.delimited.delimited_layout import (
     DELIMITERS,
     Layout,
     bare_fields,

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbas.findings import Finding, Severity
-from sbas.logs.sbf_decode import Removed
-from sbas.logs.sbf_foreign import count_foreign, cut_block
-from sbas.logs.sbf_table import DO229_SATELLITES, Levels, Raw
 from sbas.logs.sentinels import sentinel_findings
+from sbas.logs.septentrio.sbf_decode import Removed
+from sbas.logs.septentrio.sbf_foreign import count_foreign, cut_block
+from sbas.logs.septentrio.sbf_table import DO229_SATELLITES, Levels, Raw
 from sbas.recording import ProtectionLevelMeta
 
 BAD_SHARE = 0.01

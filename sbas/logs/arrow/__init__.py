@@ -1,0 +1,1 @@
+"""Parquet: the format of this package, and tables of other programs."""

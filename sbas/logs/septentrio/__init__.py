@@ -1,0 +1,1 @@
+"""Septentrio SBF, read and written."""
