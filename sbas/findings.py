@@ -16,6 +16,7 @@ Severity = Literal["error", "warning", "info"]
 
 CODES: dict[str, str] = {
     "E01": "no truth for position errors",
+    "E02": "times in another scale than stated",
     "E03": "latitude and longitude look like radians",
     "E04": "gaps in the recording",
     "E05": "epochs with the same time",
@@ -24,6 +25,7 @@ CODES: dict[str, str] = {
     "E08": "values in another unit than stated",
     "E09": "uncertain truth",
     "E10": "epochs or records incomplete",
+    "E11": "a leap second, or its correction, inside the recording",
     "E12": "positions far from the truth",
     "E13": "protection level zero or negative",
     "E14": "time goes backward",
@@ -34,6 +36,7 @@ CODES: dict[str, str] = {
     "E19": "text encoding repaired",
     "E20": "decimal comma",
     "E21": "decoded size out of proportion",
+    "E22": "dates before GNSS, in the future, or a week rollover off",
     "E23": "protection levels that DO-229 does not define",
     "E24": "bytes that belong to no valid block",
     "E25": "metadata missing, unreadable or contradicted",

@@ -14,8 +14,8 @@ import sbas
 PACKAGE = Path(sbas.__file__).parent
 
 LAYERS = (
-    "version", "numerals", "exceptions", "findings", "timescales", "estimate", "recording",
-    "bundled", "streaming", "recording_survey", "truth", "input_check", "logs", "laboratory",
+    "version", "numerals", "exceptions", "findings", "timescales", "estimate", "recording", "satellite_table",
+    "bundled", "streaming", "recording_survey", "frames", "track", "truth", "input_check", "logs", "laboratory",
     "integrity", "dependability", "plots", "reporting", "cli",
 )  # fmt: skip
 """From the ground up: a module imports only from its own layer and those before it."""
@@ -26,7 +26,7 @@ ONLY_IN = {
     "typer": {"cli"},
     "rich": {"cli"},
 }
-ORACLES = {"pysbf2", "mpmath", "hypothesis", "pytest", "pynmeagps", "pyrtcm"}
+ORACLES = {"pysbf2", "pyubx2", "mpmath", "hypothesis", "pytest", "pynmeagps", "pyrtcm"}
 
 
 def modules() -> list[Path]:
