@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from sbas.cli import inputs, output
+from sbas.cli.option_groups import with_option_groups
 from sbas.integrity.comparison.comparison import compare as compare_sources
 from sbas.integrity.comparison.comparison_results import PAPER_TAU_S
 
@@ -16,26 +17,19 @@ def register(app: typer.Typer) -> None:
     app.command("compare")(compare)
 
 
+@with_option_groups
 def compare(
     a: Annotated[Path, typer.Argument(help="First recording, such as the one in PA mode.")],
     b: Annotated[Path, typer.Argument(help="Second recording of the same hours.")],
-    truth: inputs.TruthText = None,
+    truth: inputs.TruthGiven,
+    reading: inputs.Reading,
+    repairing: inputs.Repairing,
     alert_limit: Annotated[str, typer.Option(help="Alert limits in metres.")] = "50,25,20",
     tau_s: Annotated[
         float, typer.Option("--tau-s", help="1/e time of what correlates epochs, in seconds.")
     ] = PAPER_TAU_S,
     confidence: Annotated[float, typer.Option(help="Of the two-sided intervals.")] = 0.95,
-    frame: inputs.Frame = "",
-    antenna_height: inputs.AntennaHeight = 0.0,
-    truth_max_step: inputs.MaxStep = 1.0,
     accept: inputs.Accept = None,
-    format_name: inputs.FormatName = None,
-    time_scale: inputs.TimeScaleName = None,
-    mode_map: inputs.ModeMap = None,
-    geoid: inputs.Geoid = None,
-    sort: inputs.Sort = False,
-    duplicates: inputs.Duplicates = None,
-    pl_zero: inputs.PlZero = None,
     json: output.Json = False,
     quiet: output.Quiet = False,
 ) -> None:
@@ -43,24 +37,12 @@ def compare(
 
     Example:  sbas compare pa.sbf npa.sbf --truth 50.03,15.77,289.4
     """
-    known = inputs.open_truth(
-        truth,
-        frame=frame,
-        antenna_height_m=antenna_height,
-        max_step_s=truth_max_step,
-        time_scale=time_scale,
-        geoid=geoid,
-    )
+    known = inputs.open_truth(truth, reading)
     first, second = (
         inputs.open_source(
             [path],
-            format_name=format_name,
-            time_scale=time_scale,
-            mode_map=mode_map,
-            geoid=geoid,
-            sort=sort,
-            duplicates=duplicates,
-            pl_zero=pl_zero,
+            reading,
+            repairing,
             quiet=quiet,
         )
         for path in (a, b)

@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from sbas.cli import inputs, output
+from sbas.cli.option_groups import with_option_groups
 from sbas.estimate import Estimate, Refusal
 from sbas.exceptions import InputError
 from sbas.integrity.causes.causes import Causes, explain
@@ -47,26 +48,19 @@ def register(app: typer.Typer) -> None:
     app.command("rate")(rate)
 
 
+@with_option_groups
 def evaluate_files(
     files: inputs.Files,
-    truth: inputs.TruthText = None,
+    truth: inputs.TruthGiven,
+    reading: inputs.Reading,
+    repairing: inputs.Repairing,
     alert_limit: Annotated[str, typer.Option(help="Alert limits in metres.")] = "50,25,20",
     report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
-    frame: inputs.Frame = "",
-    antenna_height: inputs.AntennaHeight = 0.0,
-    truth_max_step: inputs.MaxStep = 1.0,
     time_to_alert: TimeToAlert = _DEFAULTS.time_to_alert_s,
     merge: Merge = _DEFAULTS.merge_s,
     reset: Reset = _DEFAULTS.reset_s,
     confidence: Confidence = _DEFAULTS.confidence,
     accept: inputs.Accept = None,
-    format_name: inputs.FormatName = None,
-    time_scale: inputs.TimeScaleName = None,
-    mode_map: inputs.ModeMap = None,
-    geoid: inputs.Geoid = None,
-    sort: inputs.Sort = False,
-    duplicates: inputs.Duplicates = None,
-    pl_zero: inputs.PlZero = None,
     json: output.Json = False,
     quiet: output.Quiet = False,
 ) -> None:
@@ -76,24 +70,14 @@ def evaluate_files(
     """
     limits = inputs.alert_limits(alert_limit)
     if report is not None:
-        inputs.refuse_to_overwrite(report, [*files, *([] if truth is None else [Path(truth)])])
-    known = inputs.open_truth(
-        truth,
-        frame=frame,
-        antenna_height_m=antenna_height,
-        max_step_s=truth_max_step,
-        time_scale=time_scale,
-        geoid=geoid,
-    )
+        inputs.refuse_to_overwrite(
+            report, [*files, *([] if truth.truth is None else [Path(truth.truth)])]
+        )
+    known = inputs.open_truth(truth, reading)
     source = inputs.open_source(
         files,
-        format_name=format_name,
-        time_scale=time_scale,
-        mode_map=mode_map,
-        geoid=geoid,
-        sort=sort,
-        duplicates=duplicates,
-        pl_zero=pl_zero,
+        reading,
+        repairing,
         quiet=quiet,
     )
     with output.progress("evaluating", quiet) as callback:
@@ -181,10 +165,13 @@ def _upper(figure: Estimate | Refusal) -> str:
     return "-" if figure.upper is None else upward(figure.upper)
 
 
+@with_option_groups
 def rate(
     files: inputs.Files,
+    truth: inputs.TruthGiven,
+    reading: inputs.Reading,
+    repairing: inputs.Repairing,
     alert_limit: Annotated[float, typer.Option(help="Horizontal alert limit in metres.")],
-    truth: inputs.TruthText = None,
     confidence: Confidence = _DEFAULTS.confidence,
     event: Annotated[
         str, typer.Option(help="; ".join(f"{k}: {v}" for k, v in EVENT_KINDS.items()))
@@ -192,19 +179,9 @@ def rate(
     target_per_h: Annotated[
         float | None, typer.Option("--target-per-h", help="Rate to be demonstrated per hour.")
     ] = None,
-    frame: inputs.Frame = "",
-    antenna_height: inputs.AntennaHeight = 0.0,
-    truth_max_step: inputs.MaxStep = 1.0,
     time_to_alert: TimeToAlert = _DEFAULTS.time_to_alert_s,
     merge: Merge = _DEFAULTS.merge_s,
     accept: inputs.Accept = None,
-    format_name: inputs.FormatName = None,
-    time_scale: inputs.TimeScaleName = None,
-    mode_map: inputs.ModeMap = None,
-    geoid: inputs.Geoid = None,
-    sort: inputs.Sort = False,
-    duplicates: inputs.Duplicates = None,
-    pl_zero: inputs.PlZero = None,
     json: output.Json = False,
     quiet: output.Quiet = False,
 ) -> None:
@@ -216,23 +193,11 @@ def rate(
         raise InputError(
             f"unknown event {event!r}", cure=f"--event with one of {', '.join(EVENT_KINDS)}"
         )
-    known = inputs.open_truth(
-        truth,
-        frame=frame,
-        antenna_height_m=antenna_height,
-        max_step_s=truth_max_step,
-        time_scale=time_scale,
-        geoid=geoid,
-    )
+    known = inputs.open_truth(truth, reading)
     source = inputs.open_source(
         files,
-        format_name=format_name,
-        time_scale=time_scale,
-        mode_map=mode_map,
-        geoid=geoid,
-        sort=sort,
-        duplicates=duplicates,
-        pl_zero=pl_zero,
+        reading,
+        repairing,
         quiet=quiet,
     )
     with output.progress("evaluating", quiet) as callback:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,97 +19,96 @@ from sbas.logs.truth_files import read_truth_table
 from sbas.recording import EpochSource
 from sbas.truth import FixedPoint, Trajectory, Truth
 
+_truth = partial(typer.Option, rich_help_panel="Truth")
+_reading = partial(typer.Option, rich_help_panel="Reading")
+_repair = partial(typer.Option, rich_help_panel="Repairs, each counted in the result")
+
 Files = Annotated[
     list[Path],
     typer.Argument(help="Recordings: SBF, RTKLIB .pos, CSV, Parquet.", metavar="FILE..."),
 ]
-FormatName = Annotated[
-    str | None, typer.Option("--format", help="Read as this format instead of looking.")
-]
-TruthText = Annotated[
-    str | None,
-    typer.Option(
-        "--truth",
-        metavar="LAT,LON,H or FILE",
-        help="True antenna position: degrees and ellipsoidal metres, or a trajectory file "
-        "(time, lat_deg, lon_deg, height_m).",
-    ),
-]
-Frame = Annotated[
-    str,
-    typer.Option(
-        "--frame", help="Reference frame of the truth; unstated, errors may be wrong by 1 m."
-    ),
-]
-AntennaHeight = Annotated[
-    float,
-    typer.Option("--antenna-height", help="Antenna above the truth's mark, in metres."),
-]
-MaxStep = Annotated[
-    float,
-    typer.Option("--truth-max-step", help="Longest step to interpolate, in seconds."),
-]
-Sort = Annotated[bool, typer.Option("--sort", help="Put epochs in the order of their times.")]
-Duplicates = Annotated[
-    str | None,
-    typer.Option("--duplicates", metavar="first|last", help="Of equal times keep this one."),
-]
-PlZero = Annotated[
-    str | None,
-    typer.Option("--pl-zero", metavar="missing", help="Protection levels <= 0 become missing."),
-]
+
+
+@dataclass(frozen=True)
+class TruthGiven:
+    """Where the antenna really was."""
+
+    truth: Annotated[
+        str | None,
+        _truth(
+            "--truth",
+            metavar="LAT,LON,H or FILE",
+            help="True antenna position: degrees and ellipsoidal metres, or a trajectory file "
+            "(time, lat_deg, lon_deg, height_m).",
+        ),
+    ] = None
+    frame: Annotated[
+        str,
+        _truth(help="Reference frame of the truth; unstated, errors may be wrong by 1 m."),
+    ] = ""
+    antenna_height: Annotated[float, _truth(help="Antenna above the truth's mark, in metres.")] = (
+        0.0
+    )
+    truth_max_step: Annotated[float, _truth(help="Longest step to interpolate, in seconds.")] = 1.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the files are to be understood."""
+
+    format: Annotated[str | None, _reading(help="Read as this format instead of looking.")] = None
+    time_scale: Annotated[
+        str | None, _reading(help="Time scale of a file that does not say it.")
+    ] = None
+    mode_map: Annotated[
+        str | None, _reading(metavar="A=MODE,...", help="Meaning of a CSV file's modes.")
+    ] = None
+    geoid: Annotated[
+        float | None,
+        _reading(help="Geoid undulation for heights above the geoid in metres."),
+    ] = None
+
+
+@dataclass(frozen=True)
+class Repairing:
+    """What is to be put right, each repair counted in the result."""
+
+    sort: Annotated[bool, _repair("--sort", help="Put epochs in the order of their times.")] = False
+    duplicates: Annotated[
+        str | None, _repair(metavar="first|last", help="Of equal times keep this one.")
+    ] = None
+    pl_zero: Annotated[
+        str | None, _repair(metavar="missing", help="Protection levels <= 0 become missing.")
+    ] = None
+
+
 Accept = Annotated[
     list[str] | None,
     typer.Option("--accept", metavar="CODE", help="Accept this error of the input, by name."),
 ]
-TimeScaleName = Annotated[
-    str | None, typer.Option("--time-scale", help="Time scale of a file that does not say it.")
-]
-ModeMap = Annotated[
-    str | None,
-    typer.Option("--mode-map", metavar="A=MODE,...", help="Meaning of a CSV file's modes."),
-]
-Geoid = Annotated[
-    float | None,
-    typer.Option("--geoid", help="Geoid undulation for heights above the geoid in metres."),
-]
 
 
 def open_source(
-    files: Sequence[Path],
-    *,
-    format_name: str | None = None,
-    time_scale: str | None = None,
-    mode_map: str | None = None,
-    geoid: float | None = None,
-    sort: bool = False,
-    duplicates: str | None = None,
-    pl_zero: str | None = None,
-    quiet: bool = False,
+    files: Sequence[Path], reading: Reading, repairing: Repairing, *, quiet: bool = False
 ) -> EpochSource:
     """The files as one source, repaired as asked."""
-    _one_of("--duplicates", duplicates, ("first", "last"))
-    _one_of("--pl-zero", pl_zero, ("missing",))
+    _one_of("--duplicates", repairing.duplicates, ("first", "last"))
+    _one_of("--pl-zero", repairing.pl_zero, ("missing",))
     given: dict[str, Any] = {
-        "time_scale": time_scale,
-        "mode_map": None if mode_map is None else _pairs(mode_map),
-        "geoid": geoid,
+        "time_scale": reading.time_scale,
+        "mode_map": None if reading.mode_map is None else _pairs(reading.mode_map),
+        "geoid": reading.geoid,
     }
     options = {name: value for name, value in given.items() if value is not None}
-    repairing = sort or duplicates or pl_zero
-    opened = read if repairing else scan
+    is_repaired = repairing != Repairing()
+    opened = read if is_repaired else scan
     sources = []
     for path in files:
         with progress(f"reading {path.name}", quiet) as callback:
-            sources.append(opened(path, format_name, progress=callback, **options))
-    if not repairing:
+            sources.append(opened(path, reading.format, progress=callback, **options))
+    if not is_repaired:
         return join_sources(sources)
-    return repair(
-        joined_recording(sources),  # type: ignore[arg-type]
-        sort=sort,
-        duplicates=duplicates,  # type: ignore[arg-type]
-        pl_zero=pl_zero,  # type: ignore[arg-type]
-    )
+    return repair(joined_recording(sources), **vars(repairing))  # type: ignore[arg-type]
 
 
 def refuse_to_overwrite(out: Path, files: Sequence[Path]) -> None:
@@ -137,33 +138,22 @@ def _pairs(text: str) -> dict[str, str]:
     return {key.strip(): mode.strip() for key, mode in pairs}
 
 
-def open_truth(
-    text: str | None,
-    *,
-    frame: str = "",
-    antenna_height_m: float = 0.0,
-    max_step_s: float = 1.0,
-    time_scale: str | None = None,
-    geoid: float | None = None,
-) -> Truth | None:
-    """The truth from `LAT,LON,H` or from a trajectory file; None where nothing was given.
-
-    `time_scale` and `geoid` serve a file that does not say its time scale, and heights above
-    the geoid.
-    """
+def open_truth(given: TruthGiven, reading: Reading) -> Truth | None:
+    """The truth from `LAT,LON,H` or from a trajectory file; None where nothing was given."""
+    text = given.truth
     if text is None:
         return None
     numbers = _three_numbers(text)
     if numbers is not None:
-        return FixedPoint(*numbers, antenna_height_m=antenna_height_m, frame=frame)
+        return FixedPoint(*numbers, antenna_height_m=given.antenna_height, frame=given.frame)
     path = Path(text)
     if not path.exists():
         raise InputError(
             f"--truth {text!r} is neither LAT,LON,HEIGHT nor a file",
             cure="--truth 50.03,15.77,289.4 (degrees and metres above the ellipsoid)",
         )
-    table = read_truth_table(path, time_scale=time_scale, geoid=geoid)  # type: ignore[arg-type]
-    return Trajectory(table, antenna_height_m, max_step_s, frame=frame)
+    table = read_truth_table(path, time_scale=reading.time_scale, geoid=reading.geoid)  # type: ignore[arg-type]
+    return Trajectory(table, given.antenna_height, given.truth_max_step, frame=given.frame)
 
 
 def _three_numbers(text: str) -> tuple[float, float, float] | None:

@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from sbas.cli import inputs, output
+from sbas.cli.option_groups import with_option_groups
 from sbas.estimate import Refusal
 from sbas.exceptions import InputError, SbasError
 from sbas.numerals import number
@@ -31,29 +32,22 @@ def register(app: typer.Typer) -> None:
     app.command("depend")(depend)
 
 
+@with_option_groups
 def states(
     files: inputs.Files,
+    truth: inputs.TruthGiven,
+    reading: inputs.Reading,
+    repairing: inputs.Repairing,
     threshold_m: Annotated[
         float, typer.Option("--threshold-m", help="An error of this size or more is wrong.")
     ],
-    truth: inputs.TruthText = None,
     boundary: Annotated[
         Literal["drop", "destination"],
         typer.Option(help="Of steps between two environments: not counted, or with the second."),
     ] = "drop",
     confidence: Annotated[float, typer.Option(help="Of the intervals.")] = 0.95,
     tail_runs: Annotated[int, typer.Option(help="Length of the runs in the tail test.")] = 6,
-    frame: inputs.Frame = "",
-    antenna_height: inputs.AntennaHeight = 0.0,
-    truth_max_step: inputs.MaxStep = 1.0,
     accept: inputs.Accept = None,
-    format_name: inputs.FormatName = None,
-    time_scale: inputs.TimeScaleName = None,
-    mode_map: inputs.ModeMap = None,
-    geoid: inputs.Geoid = None,
-    sort: inputs.Sort = False,
-    duplicates: inputs.Duplicates = None,
-    pl_zero: inputs.PlZero = None,
     json: output.Json = False,
     quiet: output.Quiet = False,
 ) -> None:
@@ -63,23 +57,11 @@ def states(
     """
     from sbas.dependability import receiver_states
 
-    known = inputs.open_truth(
-        truth,
-        frame=frame,
-        antenna_height_m=antenna_height,
-        max_step_s=truth_max_step,
-        time_scale=time_scale,
-        geoid=geoid,
-    )
+    known = inputs.open_truth(truth, reading)
     source = inputs.open_source(
         files,
-        format_name=format_name,
-        time_scale=time_scale,
-        mode_map=mode_map,
-        geoid=geoid,
-        sort=sort,
-        duplicates=duplicates,
-        pl_zero=pl_zero,
+        reading,
+        repairing,
         quiet=quiet,
     )
     with output.progress("reading states", quiet) as callback:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from sbas.cli import inputs, output
+from sbas.cli.option_groups import with_option_groups
 from sbas.estimate import Refusal
 from sbas.integrity.correlation.correlation import decorrelation as decorrelation_of_source
 
@@ -15,25 +16,18 @@ def register(app: typer.Typer) -> None:
     app.command("decorrelation")(decorrelation)
 
 
+@with_option_groups
 def decorrelation(
     files: inputs.Files,
-    truth: inputs.TruthText = None,
+    truth: inputs.TruthGiven,
+    reading: inputs.Reading,
+    repairing: inputs.Repairing,
     segments: Annotated[
         str | None,
         typer.Option(help="'environment', or seconds: one further result a label or a piece."),
     ] = None,
     confidence: Annotated[float, typer.Option(help="Of the two-sided interval.")] = 0.95,
-    frame: inputs.Frame = "",
-    antenna_height: inputs.AntennaHeight = 0.0,
-    truth_max_step: inputs.MaxStep = 1.0,
     accept: inputs.Accept = None,
-    format_name: inputs.FormatName = None,
-    time_scale: inputs.TimeScaleName = None,
-    mode_map: inputs.ModeMap = None,
-    geoid: inputs.Geoid = None,
-    sort: inputs.Sort = False,
-    duplicates: inputs.Duplicates = None,
-    pl_zero: inputs.PlZero = None,
     json: output.Json = False,
     quiet: output.Quiet = False,
 ) -> None:
@@ -41,23 +35,11 @@ def decorrelation(
 
     Example:  sbas decorrelation roof.sbf --truth 50.03,15.77,289.4
     """
-    known = inputs.open_truth(
-        truth,
-        frame=frame,
-        antenna_height_m=antenna_height,
-        max_step_s=truth_max_step,
-        time_scale=time_scale,
-        geoid=geoid,
-    )
+    known = inputs.open_truth(truth, reading)
     source = inputs.open_source(
         files,
-        format_name=format_name,
-        time_scale=time_scale,
-        mode_map=mode_map,
-        geoid=geoid,
-        sort=sort,
-        duplicates=duplicates,
-        pl_zero=pl_zero,
+        reading,
+        repairing,
         quiet=quiet,
     )
     result = decorrelation_of_source(

@@ -12,6 +12,7 @@ import typer
 
 from sbas.cli import inputs, output
 from sbas.cli.evaluation import likely_causes, print_verdict
+from sbas.cli.option_groups import with_option_groups
 from sbas.exceptions import InputError
 from sbas.findings import Finding
 from sbas.input_check import CheckResult, check
@@ -34,16 +35,12 @@ def register(app: typer.Typer) -> None:
     app.command("check")(check_files)
 
 
+@with_option_groups
 def check_files(
     files: inputs.Files,
-    truth: inputs.TruthText = None,
-    format_name: inputs.FormatName = None,
-    time_scale: inputs.TimeScaleName = None,
-    mode_map: inputs.ModeMap = None,
-    geoid: inputs.Geoid = None,
-    sort: inputs.Sort = False,
-    duplicates: inputs.Duplicates = None,
-    pl_zero: inputs.PlZero = None,
+    truth: inputs.TruthGiven,
+    reading: inputs.Reading,
+    repairing: inputs.Repairing,
     json: output.Json = False,
     quiet: output.Quiet = False,
 ) -> None:
@@ -54,13 +51,8 @@ def check_files(
     try:
         source = inputs.open_source(
             files,
-            format_name=format_name,
-            time_scale=time_scale,
-            mode_map=mode_map,
-            geoid=geoid,
-            sort=sort,
-            duplicates=duplicates,
-            pl_zero=pl_zero,
+            reading,
+            repairing,
             quiet=quiet,
         )
     except InputError as error:
@@ -71,7 +63,7 @@ def check_files(
             )
             output.print_json({"epochs": 0, "format": None, "findings": [finding.to_dict()]})
         raise
-    known = inputs.open_truth(truth, time_scale=time_scale, geoid=geoid)
+    known = inputs.open_truth(truth, reading)
     result = check(source, truth=known)
     if json:
         output.print_json(result.to_dict())
