@@ -8,56 +8,59 @@ from __future__ import annotations
 
 import difflib
 import functools
-import hashlib
 import importlib.metadata
 import inspect
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Literal, TypeVar
 
-import numpy as np
 import pandas as pd
-import pyarrow as pa
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
+from sbas.logs.archive import join_sources, joined_recording
 from sbas.logs.arrow import parquet
+from sbas.logs.decompression import PlainFile, plain_file
 from sbas.logs.delimited import delimited_text
+from sbas.logs.detection import LOWEST_SCORE, Detection, samples, told_format
+from sbas.logs.epoch_spool import SpooledEpochs, can_spool, spool
+from sbas.logs.file_sets import FileSet, PathLike, checked_file, find_files, sha256_of
 from sbas.logs.format import Format, Match, Progress
-from sbas.logs.not_read import unread_format
+from sbas.logs.nmea import nmea
+from sbas.logs.programs import ginan_spp, glab_output, novatel_oem, pegasus_csv
+from sbas.logs.provenance import completed
 from sbas.logs.rtklib import rtklib_pos
 from sbas.logs.septentrio import septentrio_sbf
-from sbas.recording import EpochSource, Recording, RecordingMeta, Source, with_columns
+from sbas.logs.text_input import WHOLE_BYTES
+from sbas.logs.ublox import ublox_ubx, ubx_hex_csv
+from sbas.recording import EpochSource, Recording, RecordingMeta, with_columns
 from sbas.timescales import TimeScale
 
 FORMATS: tuple[Format, ...] = (
     septentrio_sbf.FORMAT,
+    ublox_ubx.FORMAT,
+    novatel_oem.FORMAT,
+    nmea.FORMAT,
     rtklib_pos.FORMAT,
+    glab_output.FORMAT,
+    ginan_spp.FORMAT,
+    pegasus_csv.FORMAT,
+    ubx_hex_csv.FORMAT,
     parquet.FORMAT,
     delimited_text.FORMAT,
 )
 """The built-in formats."""
 
 ENTRY_POINT_GROUP = "sbas.formats"
-HEAD_BYTES = MIDDLE_BYTES = 1 << 16
-TAIL_BYTES = 1 << 12
-LOWEST_SCORE = 20
-CLOSE_SCORES = 10
-EXTENSION_BONUS = 5
+FOLDER_SCORE = 50
+"""Content that nobody named but that lies in a folder is a recording from this score on."""
 _COMMON_ARGUMENTS = {"path", "columns", "progress"}
+_NO_OPTIONS_OF_FORMATS = {"paths", "format", "columns", "progress", "max_output"}
 
 T = TypeVar("T")
-
-
-class Detection(NamedTuple):
-    """The format of a file, why, and what is odd about it (an extension of another format)."""
-
-    format: Format
-    match: Match
-    findings: tuple[Finding, ...] = ()
+S = TypeVar("S", bound=EpochSource)
 
 
 @functools.cache
@@ -107,7 +110,7 @@ def format_named(name: str) -> Format:
 
 
 def read(
-    path: str | os.PathLike[str],
+    paths: PathLike | Sequence[PathLike],
     format: str | None = None,
     *,
     columns: Sequence[str] | None = None,
@@ -115,12 +118,23 @@ def read(
     time_scale: TimeScale | None = None,
     mode_map: Mapping[str, str] | None = None,
     geoid: float | None = None,
+    encoding: str | None = None,
+    decimal: str | None = None,
+    max_line: int | None = None,
+    date: str | None = None,
+    assume_dgps: Literal["dgnss", "sbas"] | None = None,
+    nmea_checksum: Literal["required", "optional"] | None = None,
+    ubx_pl: Literal["norm", "max"] | None = None,
+    ubx_max_payload: int | None = None,
+    max_output: int | None = None,
 ) -> Recording:
-    """Recording of a file in any known format.
+    """Recording of one file or of several of one receiver, in any known format.
 
     Parameters
     ----------
-    path : the file.
+    paths : a file, a pattern such as `day*.sbf`, a folder, or a sequence of these. Several files
+        are joined in the order of their first epochs; the same content counts once. Compressed
+        files (gzip, bzip2, xz, zip of one file, `.Z`) are read as what is in them.
     format : name of the format; by default told from the content.
     columns : documented columns to read; by default all that the file has. Those that it lacks
         are filled as missing.
@@ -128,26 +142,36 @@ def read(
     time_scale : scale of the times, where the file does not say it.
     mode_map : words of the column `mode` to names of `sbas.recording.MODES`.
     geoid : undulation [m] that makes heights above the geoid ellipsoidal.
+    encoding : encoding of text, such as `latin-1`; by default told from its first bytes.
+    decimal : decimal sign of delimited text, `.` or `,`; by default told from its first lines.
+    max_line : longest line of text [bytes].
+    date : UTC date YYYY-MM-DD of the first epoch of an NMEA file that has none.
+    assume_dgps : what NMEA's differential fix is, `dgnss` or `sbas`.
+    nmea_checksum : `required`, or `optional` for NMEA sentences that may lack it.
+    ubx_pl : how two horizontal levels of UBX-NAV-PL become one, `norm` or `max`.
+    ubx_max_payload : longest payload of a UBX frame [bytes].
+    max_output : bytes that a compressed file may become; by default 8 GiB, and above 64 MiB at
+        most 200 times the file.
 
     Returns
     -------
-    Recording with the file, its size and its SHA-256 in `meta.sources`.
+    Recording with the files, their sizes and their SHA-256 in `meta.sources`.
 
     Raises
     ------
     InputError : a file that is absent, empty, of unknown format or unusable; an option that the
-        format does not have.
+        format does not have; a folder without a file of a known format.
     """
-    options = {"time_scale": time_scale, "mode_map": mode_map, "geoid": geoid}
-    found, file, digest = _prepared(path, format, options)
-    recording = _called(found.format.read, file, columns, progress, options)
-    if columns is not None:
-        recording = recording.replace(table=with_columns(recording.table, columns))
-    return recording.replace(meta=_completed(recording.meta, path, found, digest, options))
+    job = _Job(format, columns, _options(locals()), max_output)
+    files = find_files(paths)
+    if not files.several:
+        return _read(_opened(files.files[0], job), job, progress)
+    found, findings = _each(files, job, _read, progress)
+    return joined_recording(found).with_findings(*findings)
 
 
 def scan(
-    path: str | os.PathLike[str],
+    paths: PathLike | Sequence[PathLike],
     format: str | None = None,
     *,
     columns: Sequence[str] | None = None,
@@ -155,155 +179,204 @@ def scan(
     time_scale: TimeScale | None = None,
     mode_map: Mapping[str, str] | None = None,
     geoid: float | None = None,
+    encoding: str | None = None,
+    decimal: str | None = None,
+    max_line: int | None = None,
+    date: str | None = None,
+    assume_dgps: Literal["dgnss", "sbas"] | None = None,
+    nmea_checksum: Literal["required", "optional"] | None = None,
+    ubx_pl: Literal["norm", "max"] | None = None,
+    ubx_max_payload: int | None = None,
+    max_output: int | None = None,
 ) -> EpochSource:
-    """Epochs of a file for analyses that go batch by batch; arguments and errors as for `read`.
+    """Epochs of files for analyses that go batch by batch; arguments and errors as for `read`.
 
-    A format that cannot stream is read whole.
+    A format that cannot stream is read whole; of several files that are long together, one at a
+    time is held in memory.
     """
-    options = {"time_scale": time_scale, "mode_map": mode_map, "geoid": geoid}
-    found, file, digest = _prepared(path, format, options)
-    call = found.format.scan or found.format.read
-    source: EpochSource = _called(call, file, columns, progress, options)
-    meta = _completed(source.meta, path, found, digest, options)
+    job = _Job(format, columns, _options(locals()), max_output)
+    files = find_files(paths)
+    if not files.several:
+        return _scan(_opened(files.files[0], job), job, progress)
+    long = sum(path.stat().st_size for path in files.files if path.is_file()) > WHOLE_BYTES
+    found, findings = _each(files, job, _scan_aside if long else _scan, progress)
+    source = join_sources(found)
+    meta = replace(source.meta, findings=(*source.meta.findings, *findings))
     return source.replace(meta=meta) if isinstance(source, Recording) else _Described(meta, source)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What a caller of `read` or `scan` asked for, beside the files."""
+
+    format: str | None
+    columns: Sequence[str] | None
+    options: Mapping[str, Any]
+    max_output: int | None
+
+
+def _options(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Of the arguments of `read` or `scan`, the options of formats that were given."""
+    return {
+        name: value
+        for name, value in arguments.items()
+        if name not in _NO_OPTIONS_OF_FORMATS and value is not None
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class _Opened:
+    """A file after all checks: its plain form, its format, and a call that waits for its hash."""
+
+    file: PlainFile
+    found: Detection
+    digest: Callable[[], str]
+
+
+def _opened(path: Path, job: _Job, *, of_folder: bool = False) -> _Opened:
+    """A file with its format; of a folder, one whose content does not look like it is E16."""
+    plain = plain_file(checked_file(path), max_output=job.max_output)
+    if job.format is None:
+        found = _detected(plain)
+        least = FOLDER_SCORE
+    else:
+        chosen = format_named(job.format)
+        found = Detection(chosen, Match(100, "named by the caller"))
+        if of_folder:
+            found = Detection(chosen, chosen.sniff(*samples(plain.path), plain.path))
+        least = LOWEST_SCORE
+    if of_folder and found.match.score < least:
+        raise InputError(
+            "the content is of no known format for certain",
+            code="E16",
+            where=str(path),
+            evidence=f"{found.format.name}: {found.match.reason}",
+            cure="name the file itself, where it is a recording",
+        )
+    _check_options(found.format, job.options)
+    pool = ThreadPoolExecutor(1)
+    digest = pool.submit(sha256_of, path)
+    pool.shutdown(wait=False)
+    return _Opened(plain, found, digest.result)
+
+
+def _read(opened: _Opened, job: _Job, progress: Progress | None) -> Recording:
+    recording = _called(opened.found.format.read, opened, job, progress)
+    if job.columns is not None:
+        recording = recording.replace(table=with_columns(recording.table, job.columns))
+    return recording.replace(meta=_completed(recording.meta, opened, job))
+
+
+def _scan(opened: _Opened, job: _Job, progress: Progress | None) -> EpochSource:
+    call = opened.found.format.scan or opened.found.format.read
+    source: EpochSource = _called(call, opened, job, progress)
+    meta = _completed(source.meta, opened, job)
+    if isinstance(source, Recording):
+        return source.replace(meta=meta)
+    return _Described(meta, source, opened.file)
+
+
+def _scan_aside(opened: _Opened, job: _Job, progress: Progress | None) -> EpochSource:
+    """As `_scan`, with epochs that a format holds in memory set aside."""
+    source = _scan(opened, job, progress)
+    if isinstance(source, Recording) and can_spool(source.table):
+        return SpooledEpochs(source.meta, spool([source.table]))
+    return source
+
+
+def _each(
+    files: FileSet,
+    job: _Job,
+    call: Callable[[_Opened, _Job, Progress | None], S],
+    progress: Progress | None,
+) -> tuple[list[S], tuple[Finding, ...]]:
+    """Every file read or scanned, and findings on the set of them."""
+    total = sum(path.stat().st_size for path in files.files if path.is_file())
+    done = 0
+    found: list[S] = []
+    left_out: list[tuple[Path, InputError]] = []
+    for path in files.files:
+        of_folder = path in files.of_folder
+        try:
+            opened = _opened(path, job, of_folder=of_folder)
+        except InputError as problem:
+            if not of_folder or problem.code not in ("E15", "E16"):
+                raise
+            left_out.append((path, problem))
+            continue
+        size = path.stat().st_size
+        found.append(call(opened, job, _part_of(progress, done, size, total)))
+        done += size
+    if not found:
+        first, reason = left_out[0]
+        raise InputError(
+            "no file of a known format lies in the folder",
+            code="E16",
+            where=str(first.parent),
+            evidence=f"{len(left_out):,} files, the first: {first.name}, {reason.what}",
+            cure="name the files, with --format where their format is not recognised",
+        )
+    if not left_out:
+        return found, files.findings
+    shown = "; ".join(f"{path.name}: {reason.what}" for path, reason in left_out[:3])
+    finding = Finding(
+        "E16",
+        "warning",
+        f"{len(left_out):,} of {len(files.files):,} files were left out: they are empty or of no "
+        "known format",
+        evidence=shown,
+        cure="name the files that are recordings instead of their folder",
+    )
+    return found, (*files.findings, finding)
+
+
+def _part_of(progress: Progress | None, done: int, size: int, total: int) -> Progress | None:
+    """Progress of one file as that of all."""
+    if progress is None:
+        return None
+    return lambda at, of: progress(done + size * at // max(of, 1), total)
 
 
 @dataclass(frozen=True, eq=False)
 class _Described:
-    """A streaming source with the metadata that the registry completed."""
+    """A streaming source with the metadata that the registry completed.
+
+    `file` is held because what is temporary must last as long as the source.
+    """
 
     meta: RecordingMeta
     source: EpochSource
+    file: PlainFile | None = None
 
     @property
     def columns(self) -> tuple[str, ...]:
         return self.source.columns
 
     def batches(self, columns: Sequence[str]) -> Iterator[pd.DataFrame]:
-        return self.source.batches(columns)
+        # A generator, so that it holds the file even where nobody else does.
+        yield from self.source.batches(columns)
 
 
-def detect(path: str | os.PathLike[str]) -> Detection:
-    """The format of a file by its content.
+def detect(path: PathLike, *, max_output: int | None = None) -> Detection:
+    """The format of a file by its content, decompressed where it is compressed.
 
     Every format scores the content from 0 to 100; the extension adds up to 5 to its own format.
+
+    Parameters
+    ----------
+    path : the file.
+    max_output : bytes that a compressed file may become, as for `read`.
 
     Raises
     ------
     InputError : a file that is absent or empty; no score of 20; two within 10 points of another.
     """
-    file = _checked_file(path)
-    head, middle, tail = _samples(file)
-    extension = file.suffix.lower()
-    scored = []
-    for candidate in formats():
-        match = candidate.sniff(head, middle, tail, file)
-        bonus = EXTENSION_BONUS if match.score and extension in candidate.extensions else 0
-        scored.append((match.score + bonus, candidate, match))
-    scored.sort(key=lambda entry: -entry[0])
-    best_score, best, match = scored[0]
-    unread, unread_match, unread_cure = unread_format(head)
-    if unread_match.score >= max(best_score, LOWEST_SCORE):
-        raise InputError(
-            f"this is {unread}, which this version does not read",
-            code="E16",
-            where=str(path),
-            evidence=unread_match.reason,
-            cure=unread_cure,
-        )
-    if best_score < LOWEST_SCORE:
-        raise InputError(
-            "the format of the file is not recognised",
-            code="E16",
-            where=str(path),
-            evidence=_first_sight(head)
-            + "; likeliest: "
-            + ", ".join(f"{c.name} {s} ({m.reason})" for s, c, m in scored),
-            cure=f"name it: --format with one of {', '.join(f.name for f in formats())}",
-        )
-    if len(scored) > 1 and best_score - scored[1][0] < CLOSE_SCORES:
-        second_score, second, second_match = scored[1]
-        raise InputError(
-            f"the file could be {best.name} or {second.name}",
-            code="E16",
-            where=str(path),
-            evidence=f"{best.name} {best_score} ({match.reason}), "
-            f"{second.name} {second_score} ({second_match.reason})",
-            cure=f"name it: --format {best.name} or --format {second.name}",
-        )
-    findings = _plug_ins()[1]
-    owners = [f.name for f in formats() if extension in f.extensions]
-    if owners and best.name not in owners:
-        findings += (
-            Finding(
-                "E17",
-                "warning",
-                f"the extension says {' or '.join(owners)}, the content is {best.name}",
-                where=str(path),
-                evidence=f"{extension}; {match.reason}",
-                cure=f"rename it to {file.stem}{best.extensions[0]}",
-            ),
-        )
-    return Detection(best, match, findings)
+    return _detected(plain_file(checked_file(Path(path)), max_output=max_output))
 
 
-def _prepared(
-    path: str | os.PathLike[str], name: str | None, options: Mapping[str, Any]
-) -> tuple[Detection, Path, Callable[[], str]]:
-    """Format and file after all checks, and a call that waits for the SHA-256."""
-    file = _checked_file(path)
-    if name is None:
-        found = detect(path)
-    else:
-        found = Detection(format_named(name), Match(100, "named by the caller"))
-    _check_options(found.format, options)
-    pool = ThreadPoolExecutor(1)
-    digest = pool.submit(_sha256, file)
-    pool.shutdown(wait=False)
-    return found, file, digest.result
-
-
-def _checked_file(path: str | os.PathLike[str]) -> Path:
-    file = Path(path)
-    problem = cure = code = ""
-    try:
-        if not file.exists():
-            problem, cure = "there is no such file", "check the name and the folder"
-            if file.parent.is_dir() and (
-                near := difflib.get_close_matches(file.name, os.listdir(file.parent), n=1)
-            ):
-                cure += f"; there is {near[0]!r}"
-        elif file.is_dir():
-            problem, cure = "this is a folder, not a file", "name a file in it"
-        elif not file.is_file():
-            problem = "this is no regular file but a pipe or a device"
-            cure = "write what it delivers to a file, and give that"
-        elif not file.stat().st_size:
-            problem, cure, code = "the file is empty", "check that the recording was written", "E15"
-        else:
-            with open(file, "rb"):
-                pass
-    except (OSError, ValueError) as error:
-        problem, cure = f"the file cannot be opened: {error}", "check its name and permissions"
-    if problem:
-        raise InputError(problem, where=str(path), cure=cure, code=code)
-    return file
-
-
-def _samples(file: Path) -> tuple[bytes, bytes, bytes]:
-    """First 64 KiB, 64 KiB from the middle and last 4 KiB."""
-    size = file.stat().st_size
-    with open(file, "rb") as stream:
-        head = stream.read(HEAD_BYTES)
-        stream.seek(max((size - MIDDLE_BYTES) // 2, 0))
-        middle = stream.read(MIDDLE_BYTES)
-        stream.seek(max(size - TAIL_BYTES, 0))
-        return head, middle, stream.read(TAIL_BYTES)
-
-
-def _first_sight(head: bytes) -> str:
-    printable = sum(32 <= byte < 127 or byte in b"\r\n\t" for byte in head)
-    return f"first bytes {head[:16].hex(' ')}, {printable / len(head):.0%} printable"
+def _detected(file: PlainFile) -> Detection:
+    found = told_format(file, formats())
+    return found._replace(findings=(*_plug_ins()[1], *found.findings))
 
 
 def options_of(chosen: Format) -> tuple[str, ...]:
@@ -313,8 +386,8 @@ def options_of(chosen: Format) -> tuple[str, ...]:
 
 
 def _check_options(chosen: Format, options: Mapping[str, Any]) -> None:
-    for name, value in options.items():
-        if value is None or name in options_of(chosen):
+    for name in options:
+        if name in options_of(chosen):
             continue
         knowing = [f.name for f in formats() if name in options_of(f)]
         raise InputError(
@@ -325,67 +398,21 @@ def _check_options(chosen: Format, options: Mapping[str, Any]) -> None:
         )
 
 
-def _called(
-    call: Callable[..., T],
-    file: Path,
-    columns: Sequence[str] | None,
-    progress: Progress | None,
-    options: Mapping[str, Any],
-) -> T:
-    given = {name: value for name, value in options.items() if value is not None}
+def _called(call: Callable[..., T], opened: _Opened, job: _Job, progress: Progress | None) -> T:
+    file = opened.file
     try:
-        return call(file, columns=columns, progress=progress, **given)
+        return call(file.path, columns=job.columns, progress=progress, **job.options)
+    except InputError as error:
+        error.where, error.evidence = file.renamed(error.where), file.renamed(error.evidence)
+        raise
     except OSError as error:
         raise InputError(
-            "the file cannot be read", where=str(file), evidence=str(error), cure="try it again"
+            "the file cannot be read", where=str(file.given), evidence=str(error), cure="try again"
         ) from error
 
 
-def _completed(
-    meta: RecordingMeta,
-    path: str | os.PathLike[str],
-    found: Detection,
-    digest: Callable[[], str],
-    options: Mapping[str, Any],
-) -> RecordingMeta:
-    """Metadata with the file as last source, findings of detection, options and versions."""
-    source = Source(
-        path=_printable(os.fspath(path)),
-        bytes=os.path.getsize(path),
-        sha256=digest(),
-        format=found.format.name,
-        reader_version=_version("sbas"),
-    )
-    given = {
-        name: str(dict(value) if isinstance(value, Mapping) else value)
-        for name, value in options.items()
-        if value is not None
-    }
-    return replace(
-        meta,
-        sources=(*meta.sources, source),
-        findings=(*found.findings, *meta.findings),
-        options={**given, **meta.options},
-        versions={
-            **meta.versions,
-            "sbas": _version("sbas"),
-            "numpy": np.__version__,
-            "pandas": pd.__version__,
-            "pyarrow": pa.__version__,
-        },
-    )
-
-
-def _printable(path: str) -> str:
-    """A path whose bytes are no text, or that holds control characters, with those escaped."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in path)
-
-
-@functools.cache
-def _version(package: str) -> str:
-    return importlib.metadata.version(package)
-
-
-def _sha256(file: Path) -> str:
-    with open(file, "rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+def _completed(meta: RecordingMeta, opened: _Opened, job: _Job) -> RecordingMeta:
+    given = dict(job.options)
+    if job.max_output is not None and opened.file.packing:
+        given["max_output"] = job.max_output
+    return completed(meta, opened.file, opened.found, opened.digest(), given)

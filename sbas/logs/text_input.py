@@ -24,38 +24,21 @@ from numpy.typing import NDArray
 from sbas.exceptions import InputError
 from sbas.findings import Finding
 from sbas.logs.format import Progress
+from sbas.logs.text_encodings import REPLACEMENT, check_encoding, decoded, text_encoding
 
 BLOCK_BYTES = 4 << 20
 MAX_LINE_BYTES = 1 << 16
+WHOLE_BYTES = 128 << 20
+"""A longer text is not held whole in memory where an analysis goes batch by batch."""
 BAD_SHARE = 0.01
 """Share of unreadable lines above which a file counts as damaged rather than scratched."""
 
 _MISSING_WORDS = ("nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-")
 _NUMBER = r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$"
 _OTHER_NUMBER = r"^[+-]?[0-9]*([.,][0-9]{3})*[.,][0-9]+([eE][+-]?[0-9]+)?$"
-_BOMS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"),
-         (codecs.BOM_UTF16_BE, "utf-16-be"))  # fmt: skip
 
 A = TypeVar("A")
 B = TypeVar("B")
-
-
-def text_encoding(head: bytes) -> tuple[str, int]:
-    """Encoding that the first bytes show, and the length of the byte order mark.
-
-    UTF-16 without a mark is told by its NULs: Latin letters and digits have one in every pair.
-    """
-    for bom, name in _BOMS:
-        if head.startswith(bom):
-            return name, len(bom)
-    sample = np.frombuffer(head[: len(head) // 2 * 2], np.uint8)
-    if len(sample) >= 8:
-        even, odd = np.mean(sample[0::2] == 0), np.mean(sample[1::2] == 0)
-        if odd > 0.9 and even < 0.1:
-            return "utf-16-le", 0
-        if even > 0.9 and odd < 0.1:
-            return "utf-16-be", 0
-    return "utf-8", 0
 
 
 def decode_head(head: bytes) -> str:
@@ -75,16 +58,44 @@ class TextBlocks:
 
     The text behind the last line end is not part of any block but left in `unfinished`: only the
     reader of a format can tell whether it is a whole record.
+
+    Parameters
+    ----------
+    path : the file.
+    progress : called with bytes done and in all.
+    encoding : encoding of the file; by default told from its first bytes.
+    max_line : longest line [bytes]; by default MAX_LINE_BYTES.
+
+    Raises
+    ------
+    InputError : an encoding that is not known, or a length of lines below 1; while reading, E18
+        for a longer line.
     """
 
-    def __init__(self, path: Path, progress: Progress | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        progress: Progress | None = None,
+        *,
+        encoding: str | None = None,
+        max_line: int | None = None,
+    ) -> None:
+        if encoding is not None:
+            check_encoding(encoding)
+        if max_line is not None and max_line < 1:
+            raise InputError(
+                f"max_line cannot be {max_line}", where="max_line", cure="give bytes above 0"
+            )
         self.path = path
         self.unfinished = b""
         self.nul_lines = 0
         self._progress = progress
+        self._encoding = encoding
+        self._max_line = MAX_LINE_BYTES if max_line is None else max_line
         self._notes: list[str] = []
         self._nul_bytes = 0
         self._latin_bytes = 0
+        self._replaced = 0
         self._first_odd: int | None = None
 
     def __iter__(self) -> Iterator[bytes]:
@@ -93,20 +104,29 @@ class TextBlocks:
         carry = b""
         with open(self.path, "rb") as file:
             head = file.read(MAX_LINE_BYTES)
-            encoding, skip = text_encoding(head)
+            encoding, skip = self._encoding, 0
+            if encoding is None:
+                encoding, skip = text_encoding(head)
+                if skip or encoding != "utf-8":
+                    self._notes.append(f"{encoding.upper()}{' with byte order mark' * bool(skip)}")
             file.seek(skip)
-            if skip or encoding != "utf-8":
-                self._notes.append(f"{encoding.upper()}{' with byte order mark' * bool(skip)}")
+            decoder = None
+            if self._encoding is not None or encoding != "utf-8":
+                decoder = codecs.getincrementaldecoder(encoding)(errors="replace")
+                head = decoded(decoder, head)
+                decoder.reset()
             old_mac = b"\n" not in head and b"\r" in head
             if old_mac:
                 self._notes.append("lines end in CR alone")
-            decoder = None
-            if encoding != "utf-8":
-                decoder = codecs.getincrementaldecoder(encoding)(errors="replace")
             while raw := file.read(BLOCK_BYTES):
                 offset, done = done, done + len(raw)
                 if decoder is not None:
-                    raw = decoder.decode(raw).encode("utf-8")
+                    raw = decoded(decoder, raw)
+                    if not offset:
+                        raw = raw.removeprefix(codecs.BOM_UTF8)
+                    if lost := raw.count(REPLACEMENT):
+                        self._replaced += lost
+                        self._seen(offset + skip)
                 if old_mac:
                     raw = raw.replace(b"\r", b"\n")
                 text = carry + raw
@@ -117,24 +137,28 @@ class TextBlocks:
                     yield self._clean(text[:cut], offset + skip)
                 if self._progress is not None:
                     self._progress(min(done + skip, total), total)
+            if decoder is not None and (tail := decoder.decode(b"", True)):
+                carry += tail.encode("utf-8", errors="replace")  # half a character: cut
+                self._replaced += 1
         self.unfinished = self._clean(carry, done) if carry.strip() else b""
 
     def _refuse_long_lines(self, text: bytes, offset: int) -> None:
-        """E18 for a line above MAX_LINE_BYTES, of NULs (a hole that a crash left) apart."""
+        """E18 for a line above `max_line`, of NULs (a hole that a crash left) apart."""
         start = 0
-        while len(text) - start > MAX_LINE_BYTES:
+        while len(text) - start > self._max_line:
             # The last line end within reach: a jump of many lines at once.
-            if (end := text.rfind(b"\n", start, start + MAX_LINE_BYTES + 1)) < 0:
+            if (end := text.rfind(b"\n", start, start + self._max_line + 1)) < 0:
                 end = text.find(b"\n", start)
                 end = len(text) if end < 0 else end
                 if text[start:end].strip(b"\0"):
                     raise InputError(
-                        f"no line end within {MAX_LINE_BYTES:,} bytes",
+                        f"no line end within {self._max_line:,} bytes",
                         code="E18",
                         where=f"{self.path}, near byte {offset + start:,}",
                         evidence=f"{text[start : start + 40]!r}",
                         cure="this is no text file of records, or its line ends are lost; "
-                        "name the right format with --format",
+                        "name the right format with --format; where such lines are right, say "
+                        f"--max-line {4 * self._max_line}",
                     )
             start = end + 1
 
@@ -175,16 +199,18 @@ class TextBlocks:
             )
         if self._latin_bytes:
             notes.append(f"{self._latin_bytes:,} bytes are no UTF-8 and were read as Latin-1")
+        if self._replaced:
+            notes.append(f"{self._replaced:,} characters cannot be read in its encoding")
         if not notes:
             return ()
         where = "" if self._first_odd is None else f"from byte {self._first_odd:,}"
         return (
             Finding(
                 "E19",
-                "warning" if self._nul_bytes or self._latin_bytes else "info",
+                "warning" if self._nul_bytes or self._latin_bytes or self._replaced else "info",
                 "the text is not plain UTF-8: " + "; ".join(notes),
                 where=where,
-                cure="save the file as UTF-8",
+                cure="save the file as UTF-8, or name what it is: --encoding latin-1",
             ),
         )
 

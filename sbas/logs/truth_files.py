@@ -13,6 +13,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 
 from sbas.exceptions import InputError
+from sbas.frames import find_frame, unprojected
 from sbas.logs.arrow.parquet import opened, read
 from sbas.logs.arrow.parquet_foreign import map_foreign
 from sbas.logs.arrow.parquet_writer import META_KEY
@@ -22,6 +23,8 @@ from sbas.logs.delimited.column_names import TRUTH_COLUMNS
 from sbas.timescales import TimeScale
 
 POSITION = ("lat_deg", "lon_deg", "height_m")
+PROJECTED = ("x_easting_m", "x_northing_m")
+"""Columns `easting_m` and `northing_m`, which no recording documents."""
 
 
 def read_truth_table(
@@ -29,6 +32,7 @@ def read_truth_table(
     *,
     time_scale: TimeScale | None = None,
     geoid: float | None = None,
+    frame: str = "",
 ) -> pd.DataFrame:
     """Truth trajectory of a file.
 
@@ -39,11 +43,13 @@ def read_truth_table(
     time_scale : scale of the times where the file does not say it; needed for Parquet without
         metadata of sbas.
     geoid : undulation [m], added where the file says that its heights are above the geoid.
+    frame : projection such as "EPSG:25833", for a file with `easting_m` and `northing_m`.
 
     Returns
     -------
     Table indexed by `time` (GPS time), float64 columns `lat_deg`, `lon_deg`, `height_m`, and
-    the optional ones that the file has; rows in file order.
+    the optional ones that the file has; rows in file order. Of projected coordinates, latitude
+    and longitude in the datum of the projection.
 
     Raises
     ------
@@ -58,7 +64,7 @@ def read_truth_table(
         )
     with open(file, "rb") as stream:
         is_parquet = stream.read(4) == b"PAR1"
-    columns = (*POSITION, *TRUTH_COLUMNS)
+    columns = (*POSITION, *TRUTH_COLUMNS, *PROJECTED)
     if not is_parquet:
         mapped = delimited_text.read_mapped(file, columns=columns, extra=TRUTH_COLUMNS, geoid=geoid)
         if time_scale not in (None, mapped.time_scale) and "time_scale" in mapped.options:
@@ -66,14 +72,14 @@ def read_truth_table(
             mapped = delimited_text.read_mapped(
                 file, columns=columns, extra=TRUTH_COLUMNS, time_scale=time_scale, geoid=geoid
             )
-        return _checked(mapped, str(path))
+        return _checked(mapped, frame, str(path))
     with opened(file) as parquet:
         if META_KEY not in (parquet.schema_arrow.metadata or {}):
             mapped = _foreign(parquet, file, columns, time_scale, geoid)
-            return _checked(mapped, str(path))
+            return _checked(mapped, frame, str(path))
     recording = read(file, columns=POSITION)  # its metadata say scale and kind of height
     errors = tuple(f for f in recording.meta.findings if f.severity == "error")
-    return _checked(MappedTable(recording.table, errors, "GPST", None, {}), str(path))
+    return _checked(MappedTable(recording.table, errors, "GPST", None, {}), frame, str(path))
 
 
 def _foreign(
@@ -94,14 +100,16 @@ def _foreign(
     )
 
 
-def _checked(mapped: MappedTable, where: str) -> pd.DataFrame:
-    lacking = [name for name in POSITION if name not in mapped.table]
+def _checked(mapped: MappedTable, frame: str, where: str) -> pd.DataFrame:
+    projected = "lat_deg" not in mapped.table and all(name in mapped.table for name in PROJECTED)
+    needed = (*PROJECTED, "height_m") if projected else POSITION
+    lacking = [name for name in needed if name not in mapped.table]
     if lacking:
         raise InputError(
             f"the truth has no {', '.join(lacking)}",
             where=where,
             evidence=mapped.options.get("columns", ", ".join(mapped.table.columns)),
-            cure="name the columns time, lat_deg, lon_deg, height_m",
+            cure="name the columns time, lat_deg, lon_deg, height_m (or easting_m, northing_m)",
         )
     # Decimal commas are read without doubt or refused; an undulation that no height needs is
     # there for the recording.
@@ -117,8 +125,8 @@ def _checked(mapped: MappedTable, where: str) -> pd.DataFrame:
             evidence=odd[0].evidence,
             cure=odd[0].cure or "correct the file",
         )
-    table = mapped.table[[n for n in (*POSITION, *TRUTH_COLUMNS) if n in mapped.table]]
-    incomplete = table[list(POSITION)].isna().any(axis=1)
+    table = mapped.table[[n for n in (*needed, *TRUTH_COLUMNS) if n in mapped.table]]
+    incomplete = table[list(needed)].isna().any(axis=1)
     if incomplete.any():
         raise InputError(
             "the truth has rows without a position",
@@ -127,4 +135,20 @@ def _checked(mapped: MappedTable, where: str) -> pd.DataFrame:
             f"{table.index[incomplete.to_numpy().argmax()]}",
             cure="take those rows out: a gap in the truth is honest",
         )
+    if projected:
+        table = _unprojected(table, frame, where)
     return table.astype("f8")
+
+
+def _unprojected(table: pd.DataFrame, frame: str, where: str) -> pd.DataFrame:
+    if not frame:
+        raise InputError(
+            "the truth has easting and northing, and nobody said of which projection",
+            where=where,
+            cure="--frame EPSG:25833, the code of the projection",
+        )
+    if any(table[name].dtype.kind not in "fiu" for name in PROJECTED):
+        raise InputError("the truth's easting and northing are no numbers", where=where)
+    lat, lon = unprojected(find_frame(frame), *(table[name].to_numpy() for name in PROJECTED))
+    others = [name for name in table if name not in PROJECTED]
+    return table.assign(lat_deg=lat, lon_deg=lon)[["lat_deg", "lon_deg", *others]]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import gzip
 import hashlib
 import importlib.metadata
+import importlib.util
 import inspect
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +19,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sbas.exceptions import InputError
+from sbas.input_check import check, repair
 from sbas.logs import registry
 from sbas.logs.arrow import parquet
 from sbas.logs.delimited import delimited_text
 from sbas.logs.format import Format, Match
+from sbas.logs.nmea import nmea
+from sbas.logs.programs import ginan_spp, glab_output, novatel_oem, pegasus_csv
 from sbas.logs.rtklib import rtklib_pos
 from sbas.logs.septentrio import septentrio_sbf
-from sbas.recording import Recording
+from sbas.logs.ublox import ublox_ubx, ubx_hex_csv
+from sbas.recording import EpochSource, Recording
+from tests.logs.nmea import nmea_samples
+from tests.logs.programs import glab_samples, test_ginan_spp, test_novatel_oem, test_pegasus_csv
+from tests.logs.ublox import ubx_samples
+from tests.logs.ublox.test_ubx_hex_csv import line as hex_line
 
 # A DOP block of pysbf2's tests (methods page, section 11): HPL 3.889 m, VPL 5.675 m.
 DOP = bytes.fromhex("244057f9a10f2000e052c91c3f0925004f0028002c004200f5e77840fc96b540")
@@ -42,6 +52,15 @@ CSV = "time,lat,lon,height,hpl\n" + "".join(
 NMEA = b"$GPGGA,093000.00,5002.0700,N,01546.2720,E,2,08,1.1,245.3,M,44.5,M,3.0,0120*47\r\n"
 RINEX = b"     3.03           OBSERVATION DATA    M                   RINEX VERSION / TYPE\n"
 UBX = b"\xb5\x62\x01\x22\x00\x00\x23\x6a"
+UBX_LOG = b"".join(ubx_samples.epoch(1000 * i) for i in range(60))
+NEEDS_LIBRARY = {novatel_oem.FORMAT.name}
+"""Formats that need a library of an extra, which may be absent."""
+
+
+def readable(samples: dict[str, bytes]) -> dict[str, bytes]:
+    """The samples of formats that can be read here."""
+    absent = importlib.util.find_spec("novatel_edie") is None
+    return {k: v for k, v in samples.items() if not (absent and k in NEEDS_LIBRARY)}
 
 
 def parquet_bytes(folder: Path) -> bytes:
@@ -58,6 +77,15 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
         rtklib_pos.FORMAT.name: POS.encode(),
         parquet.FORMAT.name: parquet_bytes(tmp_path_factory.mktemp("samples")),
         delimited_text.FORMAT.name: CSV.encode(),
+        nmea.FORMAT.name: b"".join(nmea_samples.log(60)),
+        ublox_ubx.FORMAT.name: UBX_LOG,
+        ubx_hex_csv.FORMAT.name: "".join(
+            hex_line(ubx_samples.epoch(1000 * i)) for i in range(60)
+        ).encode(),
+        glab_output.FORMAT.name: glab_samples.run(60).encode(),
+        ginan_spp.FORMAT.name: test_ginan_spp.run(60).encode(),
+        pegasus_csv.FORMAT.name: test_pegasus_csv.table_of(60).encode(),
+        novatel_oem.FORMAT.name: test_novatel_oem.RUN,
     }
 
 
@@ -114,7 +142,8 @@ def test_a_cut_sample_never_raises_anything_but_input_error(
 
 
 def test_reading_fills_in_the_provenance(tmp_path: Path, samples: dict[str, bytes]) -> None:
-    for chosen in registry.FORMATS:
+    for name in readable(samples):
+        chosen = registry.format_named(name)
         path = put(tmp_path, samples[chosen.name], "sample" + chosen.extensions[0])
         for call in (registry.read, registry.scan):
             meta = call(path).meta
@@ -128,7 +157,7 @@ def test_reading_fills_in_the_provenance(tmp_path: Path, samples: dict[str, byte
 
 
 def test_scan_and_read_say_the_same(tmp_path: Path, samples: dict[str, bytes]) -> None:
-    for name, data in samples.items():
+    for name, data in readable(samples).items():
         path = put(tmp_path, data)
         whole = registry.read(path, name)
         batches = list(registry.scan(path, name).batches(["hpl_m", "n_sv"]))
@@ -156,10 +185,12 @@ def test_unusable_paths(tmp_path: Path) -> None:
     put(tmp_path, CSV.encode(), "roof.csv")
     cases = {
         "ruof.csv": "no such file",
-        ".": "folder",
         "bad\0name": "no such file",
         "no/such/folder.csv": "no such file",
+        "no*such.csv": "no (such )?file",
     }
+    with pytest.raises(InputError, match="a folder"):
+        registry.detect(tmp_path)
     for name, message in cases.items():
         for call in (registry.read, registry.scan, registry.detect):
             with pytest.raises(InputError, match=message) as caught:
@@ -187,17 +218,11 @@ def test_unknown_content(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "name"),
     [
-        (gzip.compress(CSV.encode()), "gzip"),
-        (b"BZh91AY&SY" + b"x" * 50, "bzip2"),
-        (b"\xfd7zXZ\x00" + b"x" * 50, "xz"),
-        (b"PK\x03\x04" + b"x" * 50, "zip"),
-        (NMEA * 20, "NMEA"),
+        (b"\x28\xb5\x2f\xfd" + b"x" * 50, "zstd"),
+        (b"7z\xbc\xaf\x27\x1c" + b"x" * 50, "7-Zip"),
+        (b"x" * 257 + b"ustar\x0000" + b"x" * 300, "tar"),
         (RINEX * 2, "RINEX"),
         (b"1.0                 COMPACT RINEX FORMAT".ljust(60) + b"CRINEX VERS\n", "RINEX"),
-        (UBX * 5, "UBX"),
-        (b"*2025-05-23T14 header\n", "Ginan"),
-        (b"SBASOUT 2016 194 1.0\n", "gLAB"),
-        (b"RX_TOM;RX_WEEK;NSV_LOCK\n1;2;3\n", "PEGASUS"),
         (b"137 25 02 15 12 00 00 3 C60D" + b"DFFD" * 15 + b"\n", "EMS"),
     ],
 )  # fmt: skip
@@ -238,9 +263,10 @@ def test_options_are_recorded(tmp_path: Path) -> None:
 
 def test_every_option_of_read_is_one_of_some_format() -> None:
     options = set(inspect.signature(registry.read).parameters) - {
-        "path", "format", "columns", "progress",
+        "paths", "format", "columns", "progress", "max_output",
     }  # fmt: skip
-    assert options == {name for f in registry.FORMATS for name in registry.options_of(f)}
+    of_formats = {name for f in registry.FORMATS for name in registry.options_of(f)}
+    assert of_formats == options
     assert inspect.signature(registry.read).parameters.keys() == (
         inspect.signature(registry.scan).parameters.keys()
     )
@@ -320,7 +346,7 @@ def test_pipes_and_devices_are_no_files(tmp_path: Path) -> None:
     for path in (tmp_path / "pipe", Path("/dev/zero")):
         with pytest.raises(InputError, match="no regular file"):
             registry.read(path)
-    with pytest.raises(InputError, match="a folder"):
+    with pytest.raises(InputError, match="folder holds no file"):
         registry.read(tmp_path)
 
 
@@ -332,3 +358,163 @@ def test_a_refusal_tells_what_each_format_found(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="columns") as caught:
         registry.read(put(tmp_path, b"1," * 32_000 + b"\n"))
     assert caught.value.code == "E18"
+
+
+# Compressed files
+
+
+@pytest.mark.parametrize("call", [registry.read, registry.scan])
+def test_compressed_files_read_as_what_is_in_them(
+    tmp_path: Path, samples: dict[str, bytes], call: Callable[..., EpochSource]
+) -> None:
+    for chosen in map(registry.format_named, readable(samples)):
+        plain = put(tmp_path, samples[chosen.name], "plain" + chosen.extensions[0])
+        packed = put(tmp_path, gzip.compress(samples[chosen.name]), plain.name + ".gz")
+        expected, found = call(plain), call(packed)
+        assert found.columns == expected.columns
+        pd.testing.assert_frame_equal(
+            pd.concat(found.batches(found.columns)), pd.concat(expected.batches(expected.columns))
+        )
+        assert found.meta.findings == expected.meta.findings
+        source = found.meta.sources[-1]
+        assert (source.path, source.bytes) == (str(packed), packed.stat().st_size)
+        assert source.sha256 == hashlib.sha256(packed.read_bytes()).hexdigest()
+        assert source.format == chosen.name
+
+
+def test_a_temporary_file_lasts_as_long_as_its_source(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    packed = put(tmp_path, gzip.compress(parquet_bytes(tmp_path)), "roof.parquet.gz")
+    batches = registry.scan(packed).batches(["hpl_m"])  # nobody holds the source itself
+    gc.collect()
+    assert sum(len(batch) for batch in batches) == 60
+    del batches
+    registry.read(packed)
+    gc.collect()
+    assert not list(tmp_path.glob("sbas-*"))
+
+
+def test_errors_and_findings_name_the_file_that_was_given(tmp_path: Path) -> None:
+    packed = put(tmp_path, gzip.compress(b"time,lat,lon\n"), "roof.csv.gz")
+    with pytest.raises(InputError, match="no data") as caught:
+        registry.read(packed)
+    assert caught.value.where == str(packed)
+    odd = put(tmp_path, gzip.compress(POS.encode()), "roof.parquet.gz")
+    (finding,) = registry.read(odd).meta.findings
+    assert (finding.code, finding.where) == ("E17", str(odd))
+    assert "roof.pos" in finding.cure
+
+
+def test_max_output_is_an_option_of_every_format(tmp_path: Path) -> None:
+    packed = put(tmp_path, gzip.compress(POS.encode()), "roof.pos.gz")
+    with pytest.raises(InputError, match="E21"):
+        registry.read(packed, max_output=1000)
+    assert registry.read(packed, max_output=100_000).meta.options["max_output"] == "100000"
+    assert registry.detect(packed).format is rtklib_pos.FORMAT
+
+
+# Several files
+
+
+def hours(folder: Path, count: int = 4) -> list[Path]:
+    return [
+        put(folder, CSV.replace(" 14:", f" {10 + k}:").encode(), f"hour{count - k}.csv")
+        for k in range(count)
+    ]
+
+
+@pytest.mark.parametrize("call", [registry.read, registry.scan])
+@pytest.mark.parametrize("how", ["list", "pattern", "folder", "deep"])
+def test_several_files_are_one_recording_in_the_order_of_their_times(
+    tmp_path: Path, how: str, call: Callable[..., EpochSource]
+) -> None:
+    files = hours(tmp_path)
+    paths: object = {
+        "list": files[::-1], "pattern": str(tmp_path / "hour*.csv"), "folder": tmp_path,
+        "deep": [tmp_path / "**" / "*.csv"],
+    }[how]  # fmt: skip
+    source = call(paths)
+    table = pd.concat(source.batches(["hpl_m", "lat_deg"]))
+    assert len(table) == 240
+    assert table.index.is_monotonic_increasing
+    assert [s.path for s in source.meta.sources] == [str(f) for f in files]
+    assert source.meta.findings == ()
+    assert check(source).survey.epochs == 240
+
+
+def test_a_folder_counts_what_it_leaves_out(tmp_path: Path) -> None:
+    hours(tmp_path, 2)
+    put(tmp_path, b"", "empty.sbf")
+    put(tmp_path, b"Notes, made on the roof\nat noon, cloudy\n" * 3, "README.txt")
+    (tmp_path / ".hidden").mkdir()
+    put(tmp_path / ".hidden", CSV.encode(), "old.csv")
+    for call in (registry.read, registry.scan):
+        (finding,) = call(tmp_path).meta.findings
+        assert (finding.code, finding.severity) == ("E16", "warning")
+        assert finding.message.startswith("2 of 4 files")
+        assert "README.txt" in finding.evidence
+        assert "empty.sbf: the file is empty" in finding.evidence
+    put(tmp_path / ".hidden", b"words\n", "old.csv")
+    with pytest.raises(InputError, match="no file of a known format"):
+        registry.read(tmp_path / ".hidden")
+    with pytest.raises(InputError, match="column"):  # named, it is no bystander
+        registry.read([tmp_path / "hour1.csv", tmp_path / "README.txt"])
+
+
+def test_a_folder_of_one_format_by_name(tmp_path: Path) -> None:
+    hours(tmp_path, 2)
+    put(tmp_path, DOP * 60, "roof.sbf")
+    recording = registry.read(tmp_path, "csv")
+    assert len(recording) == 120
+    assert [f.code for f in recording.meta.findings] == ["E16"]
+
+
+def test_the_same_bytes_count_once(tmp_path: Path) -> None:
+    files = hours(tmp_path, 2)
+    copy = put(tmp_path, files[0].read_bytes(), "copy.csv")
+    for call in (registry.read, registry.scan):
+        source = call([*files, copy, files[1]])
+        assert len(pd.concat(source.batches(()))) == 120
+        (finding,) = source.meta.findings
+        assert (finding.code, finding.severity) == ("E26", "warning")
+        assert finding.message.startswith("2 of 4")
+        assert str(copy) in finding.evidence
+
+
+def test_overlapping_files_are_never_mixed_silently(tmp_path: Path) -> None:
+    even = "".join(CSV.splitlines(keepends=True)[:1] + CSV.splitlines(keepends=True)[1::2])
+    odd = "".join(CSV.splitlines(keepends=True)[:1] + CSV.splitlines(keepends=True)[2::2])
+    files = [put(tmp_path, even.encode(), "even.csv"), put(tmp_path, odd.encode(), "odd.csv")]
+    found = {f.code: f.severity for f in check(registry.scan(files)).findings}
+    assert found["E14"] == found["E06"] == "error"
+    joined = repair(registry.read(files), sort=True)
+    assert joined.table.index.is_monotonic_increasing
+    assert ("E06", "error") in [(f.code, f.severity) for f in joined.meta.findings]
+
+
+def test_long_sets_are_set_aside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = hours(tmp_path)
+    whole = registry.scan(files)
+    monkeypatch.setattr(registry, "WHOLE_BYTES", 100)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    aside = registry.scan(files)
+    assert len(list(tmp_path.glob("sbas-*"))) == 4
+    assert aside.columns == whole.columns
+    pd.testing.assert_frame_equal(
+        pd.concat(aside.batches(aside.columns)), pd.concat(whole.batches(whole.columns))
+    )
+    assert aside.meta.findings == whole.meta.findings
+    del aside
+    gc.collect()
+    assert not list(tmp_path.glob("sbas-*"))
+
+
+def test_progress_over_several_files_goes_on_to_the_end(tmp_path: Path) -> None:
+    files = hours(tmp_path)
+    total = sum(f.stat().st_size for f in files)
+    seen: list[tuple[int, int]] = []
+    registry.read(files, progress=lambda done, of: seen.append((done, of)))
+    assert seen == sorted(seen)
+    assert seen[-1] == (total, total)

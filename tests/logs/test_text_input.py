@@ -111,3 +111,47 @@ def test_open_quotes_do_not_swallow_lines() -> None:
     assert fields.texts["t"].to_pylist() == ["a", "c", "d,e"]
     assert fields.bad_lines == 1
     assert "open quote" in fields.first_bad
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1250", "utf-16", "utf-16-le", "utf-8", "cp037"])
+def test_the_encoding_is_as_asked(tmp_path: Path, encoding: str) -> None:
+    text = "time,Höhe\n2025-01-01,50.5\n"
+    path = tmp_path / "text"
+    path.write_bytes(text.encode(encoding))
+    blocks = TextBlocks(path, encoding=encoding)
+    assert b"".join(blocks) == text.encode()
+    assert blocks.findings() == ()
+    assert blocks.unfinished == b""
+
+
+def test_the_mark_is_no_text_where_the_encoding_is_asked(tmp_path: Path) -> None:
+    (tmp_path / "text").write_bytes(b"\xef\xbb\xbftime\n")
+    assert list(TextBlocks(tmp_path / "text", encoding="utf-8")) == [b"time\n"]
+
+
+def test_what_the_asked_encoding_cannot_be_is_counted(tmp_path: Path) -> None:
+    (tmp_path / "text").write_bytes("Höhe,1\n2,ö".encode("latin-1"))
+    blocks = TextBlocks(tmp_path / "text", encoding="utf-8")
+    assert list(blocks) == ["H\ufffdhe,1\n".encode()]
+    (finding,) = blocks.findings()
+    assert (finding.code, finding.severity) == ("E19", "warning")
+    assert "2 characters" in finding.message
+
+
+@pytest.mark.parametrize("encoding", ["base64", "rot13", "no-such", "", "idna", "hex"])
+def test_no_text_encoding(tmp_path: Path, encoding: str) -> None:
+    with pytest.raises(InputError, match="unknown encoding") as caught:
+        TextBlocks(tmp_path / "text", encoding=encoding)
+    assert "latin-1" in caught.value.cure
+
+
+def test_longer_lines_as_asked(tmp_path: Path) -> None:
+    (tmp_path / "text").write_bytes(b"1," * 50_000 + b"\n")
+    with pytest.raises(InputError, match="E18") as caught:
+        list(TextBlocks(tmp_path / "text"))
+    assert "--max-line" in caught.value.cure
+    assert len(b"".join(TextBlocks(tmp_path / "text", max_line=100_001))) == 100_001
+    with pytest.raises(InputError, match="E18"):
+        list(TextBlocks(tmp_path / "text", max_line=99_999))
+    with pytest.raises(InputError, match="max_line"):
+        TextBlocks(tmp_path / "text", max_line=0)

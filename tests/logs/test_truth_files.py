@@ -105,3 +105,31 @@ def test_a_pipe_is_no_truth(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="no regular file"):
         read_truth_table(tmp_path / "pipe")
+
+
+def test_projected_coordinates(tmp_path: Path) -> None:
+    # IOGP Guidance Note 7-2, Krovak: this place of S-JTSK is 50 12' 32.442" N, 16 50' 59.179" E.
+    text = "time,easting_m,northing_m,height_m,heading_deg\n2025-05-23 14:09:16,"
+    text += "-568990.997,-1050538.643,300.5,12.5\n"
+    path = put(tmp_path, text)
+    table = read_truth_table(path, frame="EPSG:5514")
+    assert list(table) == ["lat_deg", "lon_deg", "height_m", "heading_deg"]
+    assert table.iloc[0].tolist() == pytest.approx(
+        [50 + 12 / 60 + 32.442 / 3600, 16 + 50 / 60 + 59.179 / 3600, 300.5, 12.5], abs=1.5e-7
+    )
+    with pytest.raises(InputError, match="nobody said of which projection"):
+        read_truth_table(path)
+    with pytest.raises(InputError, match="not projected"):
+        read_truth_table(path, frame="ETRF2000")
+    table = pd.DataFrame(
+        {"easting_m": [-568990.997], "northing_m": [-1050538.643], "height_m": [300.5]},
+        index=pd.DatetimeIndex(["2025-05-23 14:09:16"], name="time").as_unit("ns"),
+    )
+    foreign = tmp_path / "foreign.parquet"
+    table.reset_index().to_parquet(foreign)
+    found = read_truth_table(foreign, frame="EPSG:5514", time_scale="GPST")
+    assert found["lat_deg"].iloc[0] == pytest.approx(50 + 12 / 60 + 32.442 / 3600, abs=1.5e-7)
+    with pytest.raises(InputError, match="no numbers"):
+        read_truth_table(put(tmp_path, text.replace("-568990.997", "west")), frame="EPSG:5514")
+    with pytest.raises(InputError, match="no lat_deg"):
+        read_truth_table(put(tmp_path, text.replace("northing_m", "northing")), frame="EPSG:5514")

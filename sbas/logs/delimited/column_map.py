@@ -5,9 +5,11 @@ What CSV and Parquet tables of other programs share, once their headers have nam
 
 from __future__ import annotations
 
+import math
 import re
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,47 @@ from sbas.exceptions import InputError
 from sbas.findings import Finding
 from sbas.logs.sentinels import remove_sentinels, sentinel_findings, wrapped_longitudes
 from sbas.recording import COLUMNS, MODES, SBAS_MODES, Flag, mode_categories
+
+
+@dataclass(frozen=True)
+class ColumnCounts:
+    """What was found while columns were converted, of one piece of a table or of several added.
+
+    Parameters
+    ----------
+    rows : rows of the table.
+    sentinels : values made missing, by column and value.
+    odd_counts : values of whole-number columns that are no whole number in range, by column.
+    altitudes : heights above the geoid that are there.
+    lon_deg : smallest and largest longitude, before any is wrapped.
+    beyond : longitudes above 180 degrees.
+    """
+
+    rows: int = 0
+    sentinels: Counter[tuple[str, str]] = field(default_factory=Counter)
+    odd_counts: Counter[str] = field(default_factory=Counter)
+    altitudes: int = 0
+    lon_deg: tuple[float, float] = (math.inf, -math.inf)
+    beyond: int = 0
+
+    def __add__(self, other: ColumnCounts) -> ColumnCounts:
+        return ColumnCounts(
+            self.rows + other.rows,
+            self.sentinels + other.sentinels,
+            self.odd_counts + other.odd_counts,
+            self.altitudes + other.altitudes,
+            (min(self.lon_deg[0], other.lon_deg[0]), max(self.lon_deg[1], other.lon_deg[1])),
+            self.beyond + other.beyond,
+        )
+
+    @property
+    def wrapped(self) -> tuple[Finding, ...]:
+        """E26 where the longitudes run from 0 to 360 degrees and are to be wrapped."""
+        if not self.beyond:
+            return ()
+        _, findings = wrapped_longitudes(np.array(self.lon_deg))
+        evidence = f"{self.beyond:,} of {self.rows:,} above 180"
+        return tuple(replace(finding, evidence=evidence) for finding in findings)
 
 
 def convert_columns(
@@ -49,47 +92,87 @@ def convert_columns(
     ------
     InputError : mode words that are not known, or flags that are no bits.
     """
+    columns, counts = convert_piece(
+        values, texts, rows=rows, factors=factors, mode_map=mode_map, geoid=geoid, where=where
+    )
+    return columns, column_findings(counts, altitude="altitude" in values, geoid=geoid)
+
+
+def column_findings(
+    counts: ColumnCounts, *, altitude: bool, geoid: float | None
+) -> tuple[Finding, ...]:
+    """Findings of a whole table; `altitude` says whether it has heights above the geoid."""
+    findings = list(counted_sentinel_findings(counts.sentinels))
+    if altitude:
+        findings.append(geoid_finding(counts.altitudes, counts.rows, geoid))
+    elif geoid is not None:
+        findings.append(geoid_unused())
+    findings += counts.wrapped
+    if counts.odd_counts:
+        findings.append(
+            Finding(
+                "E10",
+                "warning",
+                "counts that are no whole number in range were made missing",
+                evidence=", ".join(
+                    f"{name} {n:,}" for name, n in sorted(counts.odd_counts.items())
+                ),
+                cure="check the columns; take them out if they are not needed",
+            )
+        )
+    return tuple(findings)
+
+
+def convert_piece(
+    values: Mapping[str, NDArray[np.float64]],
+    texts: Mapping[str, Any],
+    *,
+    rows: int,
+    factors: Mapping[str, float],
+    mode_map: Mapping[str, str] | None = None,
+    geoid: float | None = None,
+    wrapped: bool | None = None,
+    where: str = "",
+) -> tuple[dict[str, object], ColumnCounts]:
+    """As `convert_columns`, for one piece of a table: counts in place of findings.
+
+    `wrapped` says whether the table's longitudes run from 0 to 360 degrees; None lets the piece
+    decide, which is then the whole table.
+    """
     raw = dict(values)
     flags = np.zeros(rows, np.uint32)
     if "flags" in raw:
         flags |= _flag_bits(raw.pop("flags"), where)
     sentinels, flags = remove_sentinels(raw, flags)
-    findings = list(sentinel_findings(sentinels))
     columns: dict[str, object] = {}
+    altitudes = 0
     if "altitude" in raw:
         altitude = raw.pop("altitude") * factors.get("altitude", 1.0)
-        columns["height_m"], geoid_findings = ellipsoidal(altitude, geoid)
-        findings += geoid_findings
-    elif geoid is not None:
-        findings.append(geoid_unused())
-    wrong: dict[str, int] = {}
+        altitudes = int(np.count_nonzero(~np.isnan(altitude)))
+        columns["height_m"], _ = ellipsoidal(altitude, geoid)
+    odd: Counter[str] = Counter()
+    counts = ColumnCounts(rows, _by_value(sentinels), odd, altitudes)
     for name, array in raw.items():
         factor = factors.get(name, 1.0)
         array = array if factor == 1.0 else array * factor
         if name == "lon_deg":
-            array, wrapped = wrapped_longitudes(array)
-            findings += wrapped
+            known = array[np.isfinite(array)]
+            span = (float(known.min()), float(known.max())) if len(known) else counts.lon_deg
+            counts = replace(counts, lon_deg=span, beyond=int(np.count_nonzero(array > 180)))
+            if wrapped or (wrapped is None and counts.wrapped):
+                array, _ = wrapped_longitudes(array)
         dtype = COLUMNS[name].dtype if name in COLUMNS else "f8"
         if dtype == "i2":
             whole = (array >= -1) & (array <= np.iinfo(np.int16).max) & (array == np.floor(array))
             off = ~whole & ~np.isnan(array)
-            wrong[name] = int(np.count_nonzero(off))
+            if off.any():
+                odd[name] = int(np.count_nonzero(off))
             flags[off] |= np.uint32(Flag.OUT_OF_RANGE)
             columns[name] = np.where(whole, array, -1).astype(np.int16)
         elif dtype == "bool":
             columns[name] = np.nan_to_num(array) != 0
         else:
             columns[name] = array
-    if counted := ", ".join(f"{name} {n:,}" for name, n in wrong.items() if n):
-        findings.append(
-            Finding(
-                "E10",
-                "warning",
-                "counts that are no whole number in range were made missing",
-                evidence=counted,
-                cure="check the columns; take them out if they are not needed",
-            )
-        )
     for name, words in texts.items():
         if name == "mode":
             columns[name] = modes(words, mode_map, where=where)
@@ -98,7 +181,8 @@ def convert_columns(
             named = [i for i, word in enumerate(uniques) if word]
             lookup = np.full(len(uniques) + 1, -1)
             lookup[named] = np.arange(len(named))
-            columns[name] = pd.Categorical.from_codes(lookup[codes], [uniques[i] for i in named])
+            labels = pd.Index([uniques[i] for i in named], dtype="str")
+            columns[name] = pd.Categorical.from_codes(lookup[codes], labels)
         elif name == "hardware_fault":
             columns[name] = _booleans(words, where)
         else:
@@ -107,7 +191,21 @@ def convert_columns(
         flags |= pl_outside_sbas(columns)
     if flags.any() or "flags" in values:
         columns["flags"] = flags
-    return columns, tuple(findings)
+    return columns, counts
+
+
+def _by_value(counts: Mapping[str, Mapping[str, int]]) -> Counter[tuple[str, str]]:
+    return Counter(
+        {(name, value): n for name, values in counts.items() for value, n in values.items() if n}
+    )
+
+
+def counted_sentinel_findings(counts: Counter[tuple[str, str]]) -> tuple[Finding, ...]:
+    """E07 of counts by column and value, in the order of their names."""
+    by_name: dict[str, dict[str, int]] = {}
+    for (name, value), number in sorted(counts.items()):
+        by_name.setdefault(name, {})[value] = number
+    return sentinel_findings(by_name)
 
 
 def _flag_bits(given: NDArray[np.float64], where: str) -> NDArray[np.uint32]:
@@ -126,7 +224,7 @@ def _flag_bits(given: NDArray[np.float64], where: str) -> NDArray[np.uint32]:
 
 def word_findings(words: Mapping[str, int]) -> tuple[Finding, ...]:
     """E07 for words such as NaN in the place of numbers."""
-    return sentinel_findings({name: {"NaN or a like word": n} for name, n in words.items()})
+    return sentinel_findings({name: {"NaN or a like word": n} for name, n in sorted(words.items())})
 
 
 def pl_outside_sbas(columns: Mapping[str, object]) -> NDArray[np.uint32]:
@@ -144,22 +242,29 @@ def ellipsoidal(
     altitude: NDArray[np.float64], geoid: float | None
 ) -> tuple[NDArray[np.float64], tuple[Finding, ...]]:
     """(n,) heights above the ellipsoid of (n,) heights above the geoid; NaN without `geoid`."""
+    known = int(np.count_nonzero(~np.isnan(altitude)))
+    findings = (geoid_finding(known, len(altitude), geoid),)
     if geoid is None:
-        finding = Finding(
+        return np.full(len(altitude), np.nan), findings
+    return altitude + geoid, findings
+
+
+def geoid_finding(known: int, rows: int, geoid: float | None) -> Finding:
+    """E25 for `known` heights above the geoid in `rows` rows."""
+    if geoid is None:
+        return Finding(
             "E25",
             "warning",
             "heights are above the geoid and no undulation is given: height_m is left missing",
-            evidence=f"{np.count_nonzero(~np.isnan(altitude)):,} heights",
+            evidence=f"{known:,} heights",
             cure="give the undulation in metres with --geoid (about 45 in Central Europe)",
         )
-        return np.full(len(altitude), np.nan), (finding,)
-    finding = Finding(
+    return Finding(
         "E25",
         "info",
-        f"{len(altitude):,} heights above the geoid made ellipsoidal",
+        f"{rows:,} heights above the geoid made ellipsoidal",
         evidence=f"undulation {geoid:g} m as given",
     )
-    return altitude + geoid, (finding,)
 
 
 def geoid_unused() -> Finding:

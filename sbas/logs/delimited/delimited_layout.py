@@ -35,6 +35,7 @@ class Layout:
     headers : one name a field, with its unit where a line of units says it.
     header_line : index of the last line before the data: the header, or its line of units.
     written : fields of the header line, and of the line of units, as they stand in the file.
+    stated : whether the caller named the decimal sign; else it is told from the first lines.
     """
 
     delimiter: str
@@ -42,6 +43,7 @@ class Layout:
     header_line: int
     decimal: str = "."
     written: tuple[tuple[str, ...], ...] = ()
+    stated: bool = False
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -77,7 +79,7 @@ def whole_lines(text: str) -> list[str]:
     return lines[:-1] if len(lines) > 1 else lines
 
 
-def find_layout(text: str, *, where: str) -> Layout:
+def find_layout(text: str, *, where: str, decimal: str | None = None) -> Layout:
     """Delimiter, header, units and decimal sign of delimited text.
 
     The header is the first line that is no comment, or the comment line before the data; that
@@ -88,12 +90,20 @@ def find_layout(text: str, *, where: str) -> Layout:
     ----------
     text : the first lines of the file.
     where : file, for messages.
+    decimal : decimal sign; by default a comma where the fields of `;` or tab have some.
 
     Raises
     ------
-    InputError : no header with two fields or more, more than MAX_COLUMNS of them, lines with
-        other counts than the header, or units that contradict the header.
+    InputError : a decimal sign that is none, no header with two fields or more, more than
+        MAX_COLUMNS of them, lines with other counts than the header, or units that contradict
+        the header.
     """
+    if decimal not in (None, ".", ","):
+        raise InputError(
+            f"the decimal sign cannot be {decimal!r}",
+            where="decimal",
+            cure="--decimal . or --decimal ,",
+        )
     lines = whole_lines(text)
     plain = [i for i, s in enumerate(lines) if s.strip() and not s.lstrip().startswith(("#", "%"))]
     comments = [i for i, s in enumerate(lines) if s.lstrip().startswith(("#", "%"))]
@@ -134,11 +144,13 @@ def find_layout(text: str, *, where: str) -> Layout:
             where=where,
             evidence=f"{len(layout.headers)} names, {len(rows[0])} fields: "
             f"{layout.delimiter.join(rows[0])[:120]}",
-            cure="write decimal points, or separate the fields by ';'"
+            cure="write decimal points, or separate the fields by ';' and say --decimal ,"
             if comma
             else "give every field a name in the header",
         )
     layout = with_line_of_units(lines, layout, where)
+    if decimal is not None:
+        return replace(layout, decimal=decimal, stated=True)
     if layout.delimiter in ";\t":
         cells = [cell for row in data_rows(text, layout) for cell in row]
         if any(re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cell) for cell in cells):

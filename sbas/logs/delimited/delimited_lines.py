@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn
@@ -34,6 +35,7 @@ from sbas.logs.text_input import (
 )
 from sbas.logs.time_stamps import (
     Stamps,
+    concatenate,
     parse_date_and_clock,
     parse_stamps,
     week_stamps,
@@ -44,7 +46,8 @@ _COMMENT_LINE = re.compile(rb"^[ \t]*[#%][^\n]*\n?", re.MULTILINE)
 _TIME_WORD = re.compile(rb"time|gpst|utc|week", re.IGNORECASE)
 _LONGEST_HEADER_LINE = 1 << 14
 _DECIMAL_CURE = (
-    "write all numbers with a decimal point, or separate fields by ';' and write all with a comma"
+    "say which it is, --decimal , or --decimal . (numbers with the other sign are then missing); "
+    "where fields are separated by commas, write the numbers with a point"
 )
 
 
@@ -57,9 +60,33 @@ class Part:
     texts: dict[str, Any]
     bad_lines: int
     example: str
-    unreadable: dict[str, int] = field(default_factory=dict)
-    words: dict[str, int] = field(default_factory=dict)
+    unreadable: Counter[str] = field(default_factory=Counter)
+    words: Counter[str] = field(default_factory=Counter)
     repeated_headers: int = 0
+
+
+def joined(parts: Sequence[Part]) -> Part:
+    """Consecutive parts as one."""
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    return Part(
+        concatenate([part.stamps for part in parts]),
+        {name: np.concatenate([part.numbers[name] for part in parts]) for name in first.numbers},
+        {name: _one_array([part.texts[name] for part in parts]) for name in first.texts},
+        sum(part.bad_lines for part in parts),
+        next((part.example for part in parts if part.example), ""),
+        sum((part.unreadable for part in parts), Counter()),
+        sum((part.words for part in parts), Counter()),
+        sum(part.repeated_headers for part in parts),
+    )
+
+
+def _one_array(arrays: Sequence[Any]) -> Any:
+    column = pa.chunked_array(arrays).combine_chunks()
+    if isinstance(column, pa.ChunkedArray):
+        column = pa.concat_arrays(column.chunks)
+    return column
 
 
 @dataclass(frozen=True)
@@ -99,6 +126,8 @@ class LineReader:
 
     def check_decimals(self, sample: str) -> None:
         """E20 where decimal commas meet decimal points, or a delimiter that is a comma."""
+        if self.layout.stated:
+            return
         rows = data_rows(sample, self.layout)
         numeric = [
             self._column(name).index
@@ -212,7 +241,7 @@ class LineReader:
             delimiter=self.layout.delimiter,
             decimal=self.layout.decimal,
         )
-        if fields.other_decimal:
+        if fields.other_decimal and not self.layout.stated:
             raise InputError(
                 "decimal comma and decimal point in one file"
                 if self.layout.delimiter in ";\t"
@@ -247,8 +276,10 @@ class LineReader:
             {name: v for name, v in text.items() if name not in TIME_PARTS},
             bad,
             example,
-            {n: int(np.count_nonzero(v)) for n, v in unreadable.items() if n not in TIME_PARTS},
-            {back[i]: n for i, n in fields.words.items() if back[i] not in TIME_PARTS},
+            Counter(
+                {n: int(np.count_nonzero(v)) for n, v in unreadable.items() if n not in TIME_PARTS}
+            ),
+            Counter({back[i]: n for i, n in fields.words.items() if back[i] not in TIME_PARTS}),
         )
 
     def _stamps(

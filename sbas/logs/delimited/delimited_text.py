@@ -7,19 +7,16 @@ what is in the recording's options under `columns`.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
-import pyarrow as pa
-from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
-from sbas.findings import Finding
-from sbas.logs.delimited.column_map import MappedTable, convert_columns, word_findings
+from sbas.logs.delimited.column_map import MappedTable
 from sbas.logs.delimited.column_names import (
     TIME_CURE,
     TIME_PARTS,
@@ -29,23 +26,13 @@ from sbas.logs.delimited.column_names import (
     map_text,
     no_level_finding,
 )
+from sbas.logs.delimited.delimited_epochs import Conversion, Settled, Tally
 from sbas.logs.delimited.delimited_layout import Layout, data_rows, find_layout, split_line
-from sbas.logs.delimited.delimited_lines import LineReader, Part
+from sbas.logs.delimited.delimited_lines import LineReader, Part, joined
+from sbas.logs.epoch_spool import SpooledEpochs, in_pieces, spool
 from sbas.logs.format import Format, Match, Progress
-from sbas.logs.text_input import (
-    BAD_SHARE,
-    TextBlocks,
-    bad_line_finding,
-    decode_head,
-    parse_numbers,
-    side_by_side,
-)
-from sbas.logs.time_stamps import (
-    concatenate,
-    scale_of_stamps,
-    stamps_to_gps,
-)
-from sbas.recording import Recording, RecordingMeta, with_columns
+from sbas.logs.text_input import WHOLE_BYTES, TextBlocks, decode_head, side_by_side
+from sbas.recording import EpochSource, Recording, RecordingMeta, with_columns
 from sbas.timescales import TimeScale
 
 
@@ -57,6 +44,9 @@ def read(
     time_scale: TimeScale | None = None,
     mode_map: Mapping[str, str] | None = None,
     geoid: float | None = None,
+    encoding: str | None = None,
+    decimal: str | None = None,
+    max_line: int | None = None,
 ) -> Recording:
     """Recording of a delimited text file.
 
@@ -69,6 +59,9 @@ def read(
         else GPST.
     mode_map : words of the mode column to names of `sbas.recording.MODES`.
     geoid : undulation [m] where heights are above the geoid (column `altitude`).
+    encoding : encoding of the text; by default told from its first bytes.
+    decimal : decimal sign of the numbers, `.` or `,`; by default told from the first lines.
+    max_line : longest line [bytes]; by default 65,536.
 
     Raises
     ------
@@ -81,16 +74,12 @@ def read(
         time_scale=time_scale,
         mode_map=mode_map,
         geoid=geoid,
-    )
-    meta = RecordingMeta(
-        time_scale=mapped.time_scale,
-        leap_seconds=mapped.leap_seconds,
-        geoid=mapped.geoid,
-        findings=(*mapped.findings, *no_level_finding(mapped.sources)),
-        options=mapped.options,
+        encoding=encoding,
+        decimal=decimal,
+        max_line=max_line,
     )
     table = mapped.table if columns is None else with_columns(mapped.table, columns)
-    return Recording(table, meta)
+    return Recording(table, _meta(mapped))
 
 
 def read_mapped(
@@ -102,191 +91,194 @@ def read_mapped(
     time_scale: TimeScale | None = None,
     mode_map: Mapping[str, str] | None = None,
     geoid: float | None = None,
+    encoding: str | None = None,
+    decimal: str | None = None,
+    max_line: int | None = None,
 ) -> MappedTable:
     """As `read`, before it becomes a Recording; `extra` names columns of `TRUTH_COLUMNS`."""
-    blocks = TextBlocks(path, progress)
-    stream = iter(blocks)
-    first = next(stream, b"")
-    if not first.strip():
-        raise InputError(
-            "the file has no whole line" if blocks.unfinished else "the file is blank",
-            code="E15",
-            where=str(path),
-            cure="check that the file was written and copied to its end",
-        )
-    sample = first[: 1 << 18].decode("utf-8", "replace")
-    layout = find_layout(sample, where=str(path))
-    reader = LineReader.of(layout, columns, extra, str(path))
-    reader.check_decimals(sample)
+    lines = _Lines.of(
+        path, columns, extra, progress, encoding=encoding, decimal=decimal, max_line=max_line
+    )
+    conversion = Conversion(lines.reader, time_scale, mode_map, geoid)
+    parts = list(lines.parts())
+    table, tally = conversion.epochs(joined(parts))
+    return _mapped(table, tally, conversion, lines)
 
-    last_line = b""
 
-    def data_blocks() -> Iterable[bytes]:
-        nonlocal last_line
-        for block in chain((_behind_line(first, layout.header_line),), stream):
-            last_line = _last_line(block) or last_line
-            yield block
+def scan(
+    path: Path,
+    *,
+    columns: Sequence[str] | None = None,
+    progress: Progress | None = None,
+    time_scale: TimeScale | None = None,
+    mode_map: Mapping[str, str] | None = None,
+    geoid: float | None = None,
+    encoding: str | None = None,
+    decimal: str | None = None,
+    max_line: int | None = None,
+) -> EpochSource:
+    """Epochs of a delimited text in bounded memory; arguments and errors as for `read`.
 
-    parts = list(side_by_side(reader.block, data_blocks()))
-    cut_lines = 0
-    if blocks.unfinished.strip():
-        if _is_whole(blocks.unfinished, last_line, layout):
-            parts.append(reader.block(blocks.unfinished + b"\n"))
-        else:
-            cut_lines = 1
-    return _joined(
-        parts, reader, blocks, cut_lines, time_scale=time_scale, mode_map=mode_map, geoid=geoid
+    A file of up to WHOLE_BYTES is read whole. The epochs of a longer one are set aside in a
+    temporary file, so that an analysis can go over them more than once.
+    """
+    options: dict[str, Any] = {"encoding": encoding, "decimal": decimal, "max_line": max_line}
+    if path.stat().st_size > WHOLE_BYTES:
+        lines = _Lines.of(path, columns, (), progress, **options)
+        return _spooled(lines, Conversion(lines.reader, time_scale, mode_map, geoid), columns)
+    return read(
+        path,
+        columns=columns,
+        progress=progress,
+        time_scale=time_scale,
+        mode_map=mode_map,
+        geoid=geoid,
+        **options,
     )
 
 
-def _joined(
-    parts: Sequence[Part],
-    reader: LineReader,
-    blocks: TextBlocks,
-    cut_lines: int,
-    *,
-    time_scale: TimeScale | None,
-    mode_map: Mapping[str, str] | None,
-    geoid: float | None,
+def _spooled(lines: _Lines, conversion: Conversion, columns: Sequence[str] | None) -> SpooledEpochs:
+    """Epochs of a long file, converted piece by piece and set aside."""
+    settled: Settled | None = None
+    while True:
+        tallies: list[Tally] = []
+        tables = _tables(lines, conversion, settled, tallies)
+        held = spool(t if columns is None else with_columns(t, columns) for t in tables)
+        used = settled or conversion.settled(tallies[0])
+        tally = sum(tallies, Tally())
+        settled = conversion.settled(tally)
+        if settled == used:
+            return SpooledEpochs(_meta(_mapped(pd.DataFrame(), tally, conversion, lines)), held)
+        # The first piece was not like the whole: once more, with what the whole settles.
+        lines = lines.again()
+
+
+def _tables(
+    lines: _Lines, conversion: Conversion, settled: Settled | None, tallies: list[Tally]
+) -> Iterator[pd.DataFrame]:
+    """Epoch tables piece by piece, their tallies appended; the first settles, if need be."""
+    for parts in in_pieces(lines.parts(), lambda part: len(part.stamps.ns)):
+        table, tally = conversion.epochs(joined(parts), settled)
+        settled = settled or conversion.settled(tally)
+        tallies.append(tally)
+        yield table
+
+
+@dataclass
+class _Lines:
+    """One pass over the lines of a file.
+
+    Parameters
+    ----------
+    first, stream : the first block of lines and those behind it.
+    again : begins another pass.
+    cut_lines, cut_line : whether the last line was left out, and what there was of it.
+    """
+
+    blocks: TextBlocks
+    reader: LineReader
+    first: bytes
+    stream: Iterator[bytes]
+    again: Callable[[], _Lines]
+    cut_lines: int = 0
+    cut_line: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        path: Path,
+        columns: Collection[str] | None,
+        extra: Collection[str],
+        progress: Progress | None,
+        *,
+        encoding: str | None,
+        decimal: str | None,
+        max_line: int | None,
+    ) -> _Lines:
+        def begin(progress: Progress | None) -> _Lines:
+            blocks = TextBlocks(path, progress, encoding=encoding, max_line=max_line)
+            stream = iter(blocks)
+            first = next(stream, b"")
+            if not first.strip():
+                raise InputError(
+                    "the file has no whole line" if blocks.unfinished else "the file is blank",
+                    code="E15",
+                    where=str(path),
+                    cure="check that the file was written and copied to its end",
+                )
+            sample = first[: 1 << 18].decode("utf-8", "replace")
+            layout = find_layout(sample, where=str(path), decimal=decimal)
+            reader = LineReader.of(layout, columns, extra, str(path))
+            reader.check_decimals(sample)
+            return cls(blocks, reader, first, stream, lambda: begin(None))
+
+        return begin(progress)
+
+    def parts(self) -> Iterator[Part]:
+        """The lines behind the header as columns, block by block, and a whole last line."""
+        last_line = b""
+
+        def data_blocks() -> Iterable[bytes]:
+            nonlocal last_line
+            head = _behind_line(self.first, self.reader.layout.header_line)
+            for block in chain((head,), self.stream):
+                last_line = _last_line(block) or last_line
+                yield block
+
+        yield from side_by_side(self.reader.block, data_blocks())
+        unfinished = self.blocks.unfinished
+        if not unfinished.strip():
+            return
+        if _is_whole(unfinished, last_line, self.reader.layout):
+            yield self.reader.block(unfinished + b"\n")
+            return
+        shown = unfinished[:120].decode("utf-8", "replace")
+        self.cut_lines, self.cut_line = 1, f"last line without line end: {shown}"
+
+
+def _mapped(
+    table: pd.DataFrame, tally: Tally, conversion: Conversion, lines: _Lines
 ) -> MappedTable:
-    stamps = concatenate([part.stamps for part in parts])
-    rows = len(stamps.ns)
-    bad = sum(part.bad_lines for part in parts) + cut_lines + blocks.nul_lines
-    example = next((part.example for part in parts if part.example), "")
-    if cut_lines and not example:
-        example = (
-            f"last line without line end: {blocks.unfinished[:120].decode('utf-8', 'replace')}"
-        )
-    if not rows:
+    """The table with what its whole file says; InputError where that has no epoch."""
+    reader = conversion.reader
+    lost = lines.cut_lines + lines.blocks.nul_lines
+    if not tally.times.rows:
+        bad = tally.bad_lines + lost
         raise InputError(
             "no line has a readable time" if bad else "the file has a header and no data",
             code="" if bad else "E15",
             where=reader.where,
-            evidence=example,
+            evidence=tally.example or lines.cut_line,
             cure=TIME_CURE if bad else "check that the recording was written",
         )
-    by_week = "time" not in reader.mapped
-    header = "week and tow" if by_week else reader.mapped["time"].header
-    said = "GPST" if by_week else reader.mapped["time"].scale
-    scale, scale_findings = scale_of_stamps(
-        stamps, time_scale, said=said, header=header, by_week=by_week, where=reader.where
-    )
-    keep: Any = slice(None)
-    if scale == "GPST" and stamps.leap.any():
-        # GPS time has no second 60: such a stamp is no time.
-        keep = ~stamps.leap
-        bad += int(np.count_nonzero(stamps.leap))
-        stamps, rows = stamps[keep], int(np.count_nonzero(keep))
-        example = example or "second 60 in GPS time"
-    times, leap_seconds, conversions = stamps_to_gps(stamps, scale)
-
-    values: dict[str, NDArray[np.float64]] = {}
-    texts: dict[str, Any] = {}
-    for name in reader.wanted:
-        if name in parts[0].numbers:
-            values[name] = np.concatenate([part.numbers[name] for part in parts])[keep]
-            continue
-        column = pa.chunked_array([part.texts[name] for part in parts]).combine_chunks()
-        if isinstance(column, pa.ChunkedArray):
-            column = pa.concat_arrays(column.chunks)
-        if not isinstance(keep, slice):
-            column = column.filter(pa.array(keep))
-        if name.startswith("x_"):
-            numbers, wrong, _ = parse_numbers(column, reader.layout.decimal)
-            if not wrong.any():
-                values[name] = numbers
-                continue
-        texts[name] = column
-    columns, column_findings = convert_columns(
-        values,
-        texts,
-        rows=rows,
-        factors={name: column.factor for name, column in reader.mapped.items()},
-        mode_map=mode_map,
-        geoid=geoid,
-        where=reader.where,
-    )
-    findings = (
-        *blocks.findings(),
-        *_decimal_finding(reader.layout),
-        *_units_finding(reader.layout),
-        *_repeated_finding(sum(part.repeated_headers for part in parts)),
-        *bad_line_finding(bad, rows, example),
-        *_unreadable_findings(parts, rows),
-        *scale_findings,
-        *conversions,
-        *word_findings(_summed(part.words for part in parts)),
-        *column_findings,
-    )
+    scale, _ = conversion.scale(tally.times)
+    leap_seconds, _ = tally.times.conversions(scale)
     options = {"columns": map_text(reader.mapped, reader.others)}
-    if not said and time_scale is None and scale == "GPST":
+    if not conversion.said and conversion.time_scale is None and scale == "GPST":
         options["time_scale"] = "GPST, since neither header nor times name another"
-    if mode_map is not None:
+    if (mode_map := conversion.mode_map) is not None:
         options["mode_map"] = ", ".join(f"{word}={name}" for word, name in mode_map.items())
-    table = pd.DataFrame(columns, index=pd.DatetimeIndex(times, name="time"))
-    geoid_text = applied_geoid(geoid, reader.wanted)
-    sources = header_sources(reader.mapped, reader.others)
-    return MappedTable(table, findings, scale, leap_seconds, options, geoid_text, sources)
-
-
-def _summed(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
-    total: dict[str, int] = {}
-    for count in counts:
-        for name, number in count.items():
-            total[name] = total.get(name, 0) + number
-    return total
-
-
-def _unreadable_findings(parts: Sequence[Part], rows: int) -> tuple[Finding, ...]:
-    counts = _summed(part.unreadable for part in parts)
-    counts = {name: number for name, number in counts.items() if number}
-    if not counts:
-        return ()
-    return (
-        Finding(
-            "E10",
-            "error" if max(counts.values()) > BAD_SHARE * rows else "warning",
-            "fields that are no numbers were made missing",
-            evidence=", ".join(f"{name} {number:,}" for name, number in counts.items()),
-            cure="correct the fields; name the column 'x_...' if it holds no such quantity",
+    return MappedTable(
+        table,
+        (
+            *lines.blocks.findings(),
+            *conversion.findings(tally, lost_lines=lost, lost_line=lines.cut_line),
         ),
+        scale,
+        leap_seconds,
+        options,
+        applied_geoid(conversion.geoid, reader.wanted),
+        header_sources(reader.mapped, reader.others),
     )
 
 
-def _decimal_finding(layout: Layout) -> tuple[Finding, ...]:
-    if layout.decimal == ".":
-        return ()
-    return (
-        Finding(
-            "E20",
-            "warning",
-            "commas in numbers were read as decimal commas",
-            evidence=f"fields are separated by {layout.delimiter!r}",
-            cure="write numbers with a decimal point",
-        ),
-    )
-
-
-def _units_finding(layout: Layout) -> tuple[Finding, ...]:
-    if len(layout.written) < 2:
-        return ()
-    shown = layout.delimiter.join(layout.written[1])
-    return (
-        Finding("E26", "info", "the line below the header was read as units", evidence=shown[:300]),
-    )
-
-
-def _repeated_finding(count: int) -> tuple[Finding, ...]:
-    if not count:
-        return ()
-    return (
-        Finding(
-            "E26",
-            "info",
-            "the header stands again among the data and was left out",
-            evidence=f"{count:,} times",
-            cure="give joined files one by one: sbas tells then whether they belong together",
-        ),
+def _meta(mapped: MappedTable) -> RecordingMeta:
+    return RecordingMeta(
+        time_scale=mapped.time_scale,
+        leap_seconds=mapped.leap_seconds,
+        geoid=mapped.geoid,
+        findings=(*mapped.findings, *no_level_finding(mapped.sources)),
+        options=mapped.options,
     )
 
 
@@ -349,4 +341,5 @@ FORMAT = Format(
     description="delimited text with a header line (comma, semicolon, tab or blanks)",
     sniff=sniff,
     read=read,
+    scan=scan,
 )

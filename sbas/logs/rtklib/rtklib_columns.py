@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,15 @@ import pymap3d
 from numpy.typing import NDArray
 
 from sbas.findings import Finding
-from sbas.logs.delimited.column_map import ellipsoidal, geoid_unused, pl_outside_sbas
+from sbas.logs.delimited.column_map import (
+    counted_sentinel_findings,
+    ellipsoidal,
+    geoid_finding,
+    geoid_unused,
+    pl_outside_sbas,
+)
 from sbas.logs.rtklib.rtklib_layout import Layout
-from sbas.logs.sentinels import remove_sentinels, sentinel_findings
+from sbas.logs.sentinels import remove_sentinels
 from sbas.recording import (
     MODES,
     Flag,
@@ -25,8 +33,8 @@ FloatArray = NDArray[np.float64]
 
 _MODE_OF_Q = {1: "rtk", 2: "rtk", 3: "sbas", 4: "dgnss", 5: "standalone", 0: "none"}
 _DEAD_RECKONING_Q = 7
-_K_H = {"6.00": 6.00, "6.18": 6.18}
-_K_V = {"5.33": 5.33}
+_K_H = (6.00, 6.18)
+_K_V = (5.33,)
 _HPL_ROUNDING_M = 0.005
 _VPL_ROUNDING_M = 0.05
 _SIGMA_ROUNDING_M = 0.00005
@@ -37,11 +45,91 @@ _DOCUMENTED = {
 }  # fmt: skip
 
 
+@dataclass(frozen=True)
+class LevelFit:
+    """How levels fit K times the sigmas beside them, in a piece or in several added.
+
+    Parameters
+    ----------
+    horizontal, vertical : candidates for K that hold on every epoch; none where no epoch has
+        both a level and a sigma.
+    outside : epochs with a level whose mode is not SBAS.
+    """
+
+    horizontal: frozenset[float] | None = None
+    vertical: frozenset[float] | None = None
+    outside: int = 0
+
+    def __add__(self, other: LevelFit) -> LevelFit:
+        return LevelFit(
+            _both(self.horizontal, other.horizontal),
+            _both(self.vertical, other.vertical),
+            self.outside + other.outside,
+        )
+
+    def meta(self) -> ProtectionLevelMeta:
+        """Kind and K factors of the levels that were looked at."""
+        k_h, k_v = (
+            next(iter(fitting)) if fitting is not None and len(fitting) == 1 else None
+            for fitting in (self.horizontal, self.vertical)
+        )
+        known = not self.outside and k_h is not None
+        return ProtectionLevelMeta(kind="do229" if known else "unknown", k_h=k_h, k_v=k_v)
+
+
+def _both(a: frozenset[float] | None, b: frozenset[float] | None) -> frozenset[float] | None:
+    return b if a is None else a if b is None else a & b
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What was counted in the fields of a piece, or of several added.
+
+    Parameters
+    ----------
+    rows : epochs.
+    missing : values made missing, by column and value.
+    heights : heights that are there.
+    """
+
+    rows: int = 0
+    missing: Counter[tuple[str, str]] = field(default_factory=Counter)
+    heights: int = 0
+    levels: LevelFit = field(default_factory=LevelFit)
+
+    def __add__(self, other: Counts) -> Counts:
+        return Counts(
+            self.rows + other.rows,
+            self.missing + other.missing,
+            self.heights + other.heights,
+            self.levels + other.levels,
+        )
+
+
+def findings(counts: Counts, layout: Layout, geoid: float | None) -> tuple[Finding, ...]:
+    """What was converted or made missing in a whole file."""
+    found = list(counted_sentinel_findings(counts.missing))
+    if layout.height == "geodetic":
+        found.append(geoid_finding(counts.heights, counts.rows, geoid))
+    elif geoid is not None:
+        found.append(geoid_unused())
+    if not layout.height:
+        found.append(
+            Finding(
+                "E25",
+                "warning",
+                "no header line says what heights refer to; taken as ellipsoidal",
+                cure="write the solution again with its header (RTKLIB option out-outhead=on)",
+            )
+        )
+    return tuple(found)
+
+
 def epoch_columns(
     values: dict[str, FloatArray], rows: int, layout: Layout, geoid: float | None
-) -> tuple[dict[str, Any], tuple[Finding, ...]]:
-    """Documented columns of (rows,) fields of a file, and what was converted or made missing."""
-    values, flags, findings = _without_sentinels(values, rows)
+) -> tuple[dict[str, Any], Counts]:
+    """Documented columns of (rows,) fields of a piece, and what was counted in them."""
+    values, flags, missing = _without_sentinels(values, rows)
     table: dict[str, Any] = {}
     if "x-ecef" in values:
         lat, lon, height = pymap3d.ecef2geodetic(
@@ -58,20 +146,9 @@ def epoch_columns(
                 table[f"sigma_{axis}_m"] = values[f"sd{axis}"]
         if "sdne" in values:
             table["cov_en_m2"] = np.copysign(values["sdne"] ** 2, values["sdne"])
+    heights = int(np.count_nonzero(~np.isnan(table["height_m"])))
     if layout.height == "geodetic":
-        table["height_m"], more = ellipsoidal(table["height_m"], geoid)
-        findings += more
-    elif geoid is not None:
-        findings.append(geoid_unused())
-    if not layout.height:
-        findings.append(
-            Finding(
-                "E25",
-                "warning",
-                "no header line says what heights refer to; taken as ellipsoidal",
-                cure="write the solution again with its header (RTKLIB option out-outhead=on)",
-            )
-        )
+        table["height_m"], _ = ellipsoidal(table["height_m"], geoid)
     table |= _velocities(values, table["lat_deg"], table["lon_deg"])
     if "age" in values:
         table["correction_age_s"] = values["age"]
@@ -93,44 +170,42 @@ def epoch_columns(
     if "mode" in table:
         flags |= pl_outside_sbas(table)
     table["flags"] = flags
-    return table, tuple(findings)
+    return table, Counts(rows, missing, heights, _level_fit(table))
 
 
 def _without_sentinels(
     values: dict[str, FloatArray], rows: int
-) -> tuple[dict[str, FloatArray], NDArray[np.uint32], list[Finding]]:
-    """The fields with what stands for "missing" as NaN, its flags and its counts (E07).
+) -> tuple[dict[str, FloatArray], NDArray[np.uint32], Counter[tuple[str, str]]]:
+    """The fields with what stands for "missing" as NaN, its flags, its counts by column and value.
 
     Angles of d m s become `latitude` and `longitude`: (0, 0) is told from those alone, and in
     ECEF only the centre of the earth is no position.
     """
-    words = {n: {"NaN": int(np.count_nonzero(np.isnan(v)))} for n, v in values.items()}
+    counts = Counter({(n, "NaN"): int(np.count_nonzero(np.isnan(v))) for n, v in values.items()})
     raw = {_DOCUMENTED.get(name, name): array for name, array in values.items()}
     flags = np.zeros(rows, np.uint32)
-    counts: dict[str, dict[str, int]] = {}
     if "x-ecef" in values:
         centre = np.all([values[f"{axis}-ecef"] == 0 for axis in "xyz"], axis=0)
         if centre.any():
-            counts["position"] = {"(0, 0, 0) in ECEF": int(np.count_nonzero(centre))}
+            counts["position", "(0, 0, 0) in ECEF"] = int(np.count_nonzero(centre))
             flags[centre] |= np.uint32(Flag.POSITION_SENTINEL)
             raw |= {f"{a}-ecef": np.where(centre, np.nan, values[f"{a}-ecef"]) for a in "xyz"}
     else:
         raw["lat_deg"], raw["lon_deg"] = _angle(values, "lat"), _angle(values, "lon")
     for name in ("hpl_m", "vpl_m"):
         if name in raw and (absent := raw[name] == 0).any():
-            counts[name] = {"0 (not computed)": int(np.count_nonzero(absent))}
+            counts[name, "0 (not computed)"] = int(np.count_nonzero(absent))
             raw[name] = np.where(absent, np.nan, raw[name])
             flags[absent] |= np.uint32(Flag.PL_SENTINEL)
     removed, flags = remove_sentinels(raw, flags)
-    for name, found in removed.items():
-        counts[name] = {**counts.get(name, {}), **found}
+    counts.update({(name, value): n for name, by in removed.items() for value, n in by.items()})
     if "x-ecef" in raw:
         broken = np.any([~np.isfinite(raw[f"{axis}-ecef"]) for axis in "xyz"], axis=0)
         written = np.all([~np.isnan(values[f"{axis}-ecef"]) for axis in "xyz"], axis=0)
         flags[broken & written] |= np.uint32(Flag.POSITION_SENTINEL)
     shown = {new: name for name, new in _DOCUMENTED.items()}
     cleaned = {shown.get(name, name): array for name, array in raw.items()}
-    return cleaned, flags, list(sentinel_findings({**words, **counts}))
+    return cleaned, flags, +counts
 
 
 def _angle(values: dict[str, FloatArray], stem: str) -> FloatArray:
@@ -188,49 +263,42 @@ def _velocities(
     }
 
 
-def protection_level_meta(table: dict[str, Any]) -> ProtectionLevelMeta:
-    """Kind and K factors, told from the ratio of the levels to the sigmas beside them.
+def _level_fit(table: dict[str, Any]) -> LevelFit:
+    """How the levels of a piece fit the sigmas beside them.
 
     A level of DO-229 is K d_major (horizontal) and K sigma_u (vertical), K_H 6.00 (NPA: 6.18),
     K_V 5.33; the ratio holds on every epoch within the rounding of the file, or it is not told.
     Source: RTCA DO-229D, J.1.
     """
     if not {"hpl_m", "sigma_e_m", "sigma_n_m", "sigma_u_m", "mode"} <= set(table):
-        return ProtectionLevelMeta()
+        return LevelFit()
     nothing = np.full(len(table["hpl_m"]), np.nan)
     d_major = major_semi_axis_m(
         table["sigma_e_m"], table["sigma_n_m"], table.get("cov_en_m2", nothing)
     )
-    k_h = _factor(table["hpl_m"], d_major, _K_H.values(), _HPL_ROUNDING_M, 4 * _SIGMA_ROUNDING_M)
-    k_v = _factor(
-        table.get("vpl_m", nothing),
-        table["sigma_u_m"],
-        _K_V.values(),
-        _VPL_ROUNDING_M,
-        _SIGMA_ROUNDING_M,
+    k_h = _fitting(table["hpl_m"], d_major, _K_H, _HPL_ROUNDING_M, 4 * _SIGMA_ROUNDING_M)
+    k_v = _fitting(
+        table.get("vpl_m", nothing), table["sigma_u_m"], _K_V, _VPL_ROUNDING_M, _SIGMA_ROUNDING_M
     )
-    with_level = ~np.isnan(table["hpl_m"])
-    all_sbas = bool(np.all(table["mode"].codes[with_level] == MODES.index("sbas")))
-    known = all_sbas and k_h is not None
-    return ProtectionLevelMeta(kind="do229" if known else "unknown", k_h=k_h, k_v=k_v)
+    modes = table["mode"].codes[~np.isnan(table["hpl_m"])]
+    return LevelFit(k_h, k_v, int(np.count_nonzero(modes != MODES.index("sbas"))))
 
 
-def _factor(
+def _fitting(
     level: FloatArray,
     sigma: FloatArray,
     candidates: Iterable[float],
     level_rounding: float,
     sigma_rounding: float,
-) -> float | None:
-    """The one candidate K with |level - K sigma| within rounding on every epoch, or None."""
+) -> frozenset[float] | None:
+    """The candidates K with |level - K sigma| within rounding on every epoch that has both."""
     known = np.isfinite(level) & np.isfinite(sigma)
     if not known.any():
         return None
-    fitting = [
+    return frozenset(
         k
         for k in candidates
         if np.all(
             np.abs(level[known] - k * sigma[known]) <= 1.01 * (level_rounding + k * sigma_rounding)
         )
-    ]
-    return fitting[0] if len(fitting) == 1 else None
+    )

@@ -8,8 +8,8 @@ says otherwise: there the number of fields decides. Source: solution.c of RTKLIB
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 
@@ -17,8 +17,9 @@ import numpy as np
 import pandas as pd
 
 from sbas.exceptions import InputError
+from sbas.logs.epoch_spool import SpooledEpochs, in_pieces, spool
 from sbas.logs.format import Format, Match, Progress
-from sbas.logs.rtklib.rtklib_columns import FloatArray, epoch_columns, protection_level_meta
+from sbas.logs.rtklib.rtklib_columns import Counts, FloatArray, epoch_columns, findings
 from sbas.logs.rtklib.rtklib_layout import (
     COLUMN_HEADER,
     Layout,
@@ -27,6 +28,7 @@ from sbas.logs.rtklib.rtklib_layout import (
     parse_header,
 )
 from sbas.logs.text_input import (
+    WHOLE_BYTES,
     TextBlocks,
     bad_line_finding,
     collapse_blanks,
@@ -42,7 +44,8 @@ from sbas.logs.time_stamps import (
     stamps_to_gps,
     week_stamps,
 )
-from sbas.recording import Recording, RecordingMeta, with_columns
+from sbas.logs.time_tally import TimeTally
+from sbas.recording import EpochSource, Recording, RecordingMeta, with_columns
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,8 @@ def read(
     columns: Sequence[str] | None = None,
     progress: Progress | None = None,
     geoid: float | None = None,
+    encoding: str | None = None,
+    max_line: int | None = None,
 ) -> Recording:
     """Recording of an RTKLIB solution file.
 
@@ -120,14 +125,69 @@ def read(
     columns : documented columns to keep; all by default.
     progress : called with bytes done and in all.
     geoid : undulation [m] where the heights are geodetic (above the geoid).
+    encoding : encoding of the text; by default told from its first bytes.
+    max_line : longest line [bytes]; by default 65,536.
 
     Raises
     ------
     InputError : no column header, baselines instead of positions, two layouts in one file, no
         row of data.
     """
+    lines = _opened(path, progress, encoding, max_line)
+    table, tally = _epochs(list(lines.parts), lines.reader.layout, columns, geoid)
+    return Recording(table, _meta(tally, lines, geoid))
+
+
+def scan(
+    path: Path,
+    *,
+    columns: Sequence[str] | None = None,
+    progress: Progress | None = None,
+    geoid: float | None = None,
+    encoding: str | None = None,
+    max_line: int | None = None,
+) -> EpochSource:
+    """Epochs of an RTKLIB solution file in bounded memory; arguments and errors as for `read`.
+
+    A file of up to WHOLE_BYTES is read whole. The epochs of a longer one are set aside in a
+    temporary file, so that an analysis can go over them more than once.
+    """
+    if path.stat().st_size <= WHOLE_BYTES:
+        return read(
+            path,
+            columns=columns,
+            progress=progress,
+            geoid=geoid,
+            encoding=encoding,
+            max_line=max_line,
+        )
+    lines = _opened(path, progress, encoding, max_line)
+    tallies: list[_Tally] = []
+
+    def tables() -> Iterator[pd.DataFrame]:
+        for parts in in_pieces(lines.parts, lambda part: len(part.stamps.ns)):
+            table, tally = _epochs(parts, lines.reader.layout, columns, geoid)
+            tallies.append(tally)
+            yield table
+
+    held = spool(tables())
+    return SpooledEpochs(_meta(sum(tallies, _Tally()), lines, geoid), held)
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """A file with its header read, and the parts of its rows to come."""
+
+    blocks: TextBlocks
+    reader: _LineReader
+    parts: Iterator[_Part]
+
+
+def _opened(
+    path: Path, progress: Progress | None, encoding: str | None, max_line: int | None
+) -> _Lines:
     where = str(path)
-    blocks = TextBlocks(path, progress)
+    blocks = TextBlocks(path, progress, encoding=encoding, max_line=max_line)
     stream = iter(blocks)
     head = b""
     first_row = None
@@ -149,8 +209,7 @@ def read(
     text = first_row.replace(separator, " ") if separator else first_row
     layout = fit_rows(layout, text.split())
     reader = _LineReader(layout, layout.names, where)
-    parts = list(side_by_side(reader.block, chain((head,), stream)))
-    return _joined(parts, reader, blocks, columns, geoid)
+    return _Lines(blocks, reader, side_by_side(reader.block, chain((head,), stream)))
 
 
 def _rows(head: bytes) -> Iterable[str]:
@@ -161,49 +220,74 @@ def _rows(head: bytes) -> Iterable[str]:
     )
 
 
-def _joined(
-    parts: Sequence[_Part],
-    reader: _LineReader,
-    blocks: TextBlocks,
-    columns: Sequence[str] | None,
-    geoid: float | None,
-) -> Recording:
-    layout = reader.layout
+@dataclass(frozen=True)
+class _Tally:
+    """What was counted in a piece, or in several added in file order."""
+
+    times: TimeTally = field(default_factory=TimeTally)
+    counts: Counts = field(default_factory=Counts)
+    bad_lines: int = 0
+    example: str = ""
+
+    def __add__(self, other: _Tally) -> _Tally:
+        return _Tally(
+            self.times + other.times,
+            self.counts + other.counts,
+            self.bad_lines + other.bad_lines,
+            self.example or other.example,
+        )
+
+
+def _epochs(
+    parts: Sequence[_Part], layout: Layout, columns: Sequence[str] | None, geoid: float | None
+) -> tuple[pd.DataFrame, _Tally]:
+    """Epoch table and tally of consecutive parts."""
     stamps = concatenate([part.stamps for part in parts])
+    names = parts[0].values
+    values = {name: np.concatenate([part.values[name] for part in parts]) for name in names}
+    times, _, _ = stamps_to_gps(stamps, layout.scale)
+    table, counts = epoch_columns(values, len(times), layout, geoid)
+    tally = _Tally(
+        TimeTally.of(stamps),
+        counts,
+        sum(part.bad_lines for part in parts),
+        next((part.example for part in parts if part.example), ""),
+    )
+    frame = pd.DataFrame(table, index=pd.DatetimeIndex(times, name="time"))
+    return frame if columns is None else with_columns(frame, columns), tally
+
+
+def _meta(tally: _Tally, lines: _Lines, geoid: float | None) -> RecordingMeta:
+    """Metadata of a file that was read to its end; InputError where it has no epoch."""
+    blocks, layout = lines.blocks, lines.reader.layout
     # RTKLIB ends every line: a last line without its end was cut, and its last number with it.
     cut = bool(blocks.unfinished.strip())
-    bad = sum(part.bad_lines for part in parts) + cut + blocks.nul_lines
-    example = next((part.example for part in parts if part.example), "")
+    bad = tally.bad_lines + cut + blocks.nul_lines
+    example = tally.example
     if cut and not example:
-        example = (
-            f"last line without line end: {blocks.unfinished[-60:].decode('utf-8', 'replace')}"
-        )
-    if not len(stamps.ns):
+        shown = blocks.unfinished[-60:].decode("utf-8", "replace")
+        example = f"last line without line end: {shown}"
+    if not tally.times.rows:
         raise InputError(
             "no line of the .pos file can be read",
-            where=reader.where,
+            where=lines.reader.where,
             evidence=example,
             cure="the lines do not fit the header line: write the solution again",
         )
-    values = {name: np.concatenate([p.values[name] for p in parts]) for name in reader.wanted}
-    times, leap_seconds, conversions = stamps_to_gps(stamps, layout.scale)
-    table, findings = epoch_columns(values, len(times), layout, geoid)
-    pl = protection_level_meta(table)
-    frame = pd.DataFrame(table, index=pd.DatetimeIndex(times, name="time"))
-    meta = RecordingMeta(
+    leap_seconds, conversions = tally.times.conversions(layout.scale)
+    return RecordingMeta(
         time_scale=layout.scale,
         leap_seconds=leap_seconds,
         frame=layout.datum,
         geoid="" if geoid is None or layout.height != "geodetic" else f"{geoid:g} m as given",
-        pl=pl,
+        pl=tally.counts.levels.meta(),
         findings=(
             *blocks.findings(),
-            *bad_line_finding(bad, len(times), example),
+            *bad_line_finding(bad, tally.times.rows, example),
             *conversions,
-            *findings,
+            *findings(tally.counts, layout, geoid),
         ),
     )
-    return Recording(frame if columns is None else with_columns(frame, columns), meta)
 
 
 def sniff(head: bytes, middle: bytes, tail: bytes, path: Path) -> Match:
@@ -220,4 +304,5 @@ FORMAT = Format(
     description="RTKLIB solution, with or without the protection levels of rtklib_ws",
     sniff=sniff,
     read=read,
+    scan=scan,
 )

@@ -37,6 +37,7 @@ COV_GEODETIC, COV_CARTESIAN = 5906, 5905
 DOP, RAIM_STATISTICS, END_OF_PVT, RECEIVER_TIME = 4001, 4011, 5921, 5914
 GEO_RAW_L1, GEO_RAW_L5, ENCAPSULATED = 4020, 4021, 4097
 PVT_GEODETIC_V1, PVT_CARTESIAN_V1, DOP_V1, RAIM_STATISTICS_V1 = 5904, 5903, 5909, 5915
+SATELLITE_POSITIONS, RESIDUALS, GEO_CORRECTIONS = 4008, 4009, 5935
 
 
 @dataclass(frozen=True)
@@ -135,6 +136,10 @@ BLOCKS: dict[int, Block] = {
         _block(RAIM_STATISTICS_V1, "RAIMStatistics v1", (40,), """14:u1:integrity_flag
             16:f4:herl 20:f4:verl 24:f4:h_velocity_erl 28:f4:v_velocity_erl
             32:u2:position_test 34:u2:velocity_test 38:u1:n=0 39:u1:size=0"""),
+        # What follows the heads of these three is in `sbf_sub_blocks`.
+        _block(SATELLITE_POSITIONS, "PVTSatCartesian", (16,), "14:u1:n=0 15:u1:size=0"),
+        _block(RESIDUALS, "PVTResiduals", (20,), "14:u1:n=0 15:u1:size_1=0 16:u1:size_2=0"),
+        _block(GEO_CORRECTIONS, "GEOCorrections", (16,), "14:u1:n=0 15:u1:size=0"),
     )
 }  # fmt: skip
 """Every block that the reader understands, by number."""

@@ -50,9 +50,9 @@ class Decoded:
             values[~good] = np.nan
         return values
 
-    def scaled(self, column: str, raw: NDArray[Any], *missing: int) -> Floats:
-        """Unsigned raw values in units of 0.01; the values in `missing` become NaN."""
-        values = raw * 0.01
+    def scaled(self, column: str, raw: NDArray[Any], *missing: int, unit: float = 0.01) -> Floats:
+        """Unsigned raw values in a unit; the values in `missing` become NaN."""
+        values = raw * unit
         for value in missing:
             at = raw == value
             if at.any():

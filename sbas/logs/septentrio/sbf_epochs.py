@@ -3,13 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sbas.timescales import GPS_EPOCH_NS, WEEK_S
+
+_WEEK_MS = WEEK_S * 1000
+_LAST_WEEK = 14_000
+"""Weeks beyond (year 2248) do not fit datetime64[ns]; they count as no time."""
+
 Index = NDArray[np.int64]
+
+
+def block_times(tow_ms: NDArray[np.uint32], week: NDArray[np.uint16]) -> Index:
+    """(n,) GPS time since 1980-01-06 [ms], -1 where a block has no usable time."""
+    time_ms = week.astype(np.int64) * _WEEK_MS + tow_ms
+    unusable = (tow_ms >= _WEEK_MS) | (week >= _LAST_WEEK)
+    if unusable.any():
+        time_ms[unusable] = -1
+    return time_ms
+
+
+def gps_times(time_ms: Index) -> NDArray[np.datetime64]:
+    """(n,) datetime64[ns] of (n,) GPS times since 1980-01-06 [ms]."""
+    return (time_ms * 1_000_000 + GPS_EPOCH_NS).view("M8[ns]")
 
 
 @dataclass(frozen=True)
@@ -27,12 +47,14 @@ class Epochs:
     Parameters
     ----------
     time_ms : (rows,) GPS time since 1980-01-06 [ms].
+    first : (rows,) place in the file of the first block of each.
     row_of : block number -> (n,) row of each of its blocks, -1 for a block that makes no row;
         `None` where block i is row i throughout.
     duplicate : (rows,) whether an earlier row has the same time, or `None` where none has.
     """
 
     time_ms: Index
+    first: Index
     row_of: Mapping[int, Index | None]
     duplicate: NDArray[np.bool_] | None
 
@@ -52,10 +74,11 @@ def join(stamps: Mapping[int, Stamps], closing: int) -> Epochs:
     present = {number: s for number, s in stamps.items() if len(s.time_ms)}
     if not any(number != closing for number in present):
         nothing: Index = np.empty(0, np.int64)
-        return Epochs(nothing, {n: np.full(len(s.time_ms), -1) for n, s in stamps.items()}, None)
+        no_row = {number: np.full(len(s.time_ms), -1) for number, s in stamps.items()}
+        return Epochs(nothing, nothing, no_row, None)
     epochs = _join_ordered(present, closing) or _join_any(present, closing)
     absent = {number: np.empty(0, np.int64) for number in stamps if number not in present}
-    return Epochs(epochs.time_ms, {**absent, **epochs.row_of}, epochs.duplicate)
+    return replace(epochs, row_of={**absent, **epochs.row_of})
 
 
 def _join_ordered(stamps: Mapping[int, Stamps], closing: int) -> Epochs | None:
@@ -81,7 +104,7 @@ def _join_ordered(stamps: Mapping[int, Stamps], closing: int) -> Epochs | None:
         else:
             row_of[number] = row
             first[row] = np.minimum(first[row], s.position)
-    return Epochs(time_ms, row_of, None) if (np.diff(first) > 0).all() else None
+    return Epochs(time_ms, first, row_of, None) if (np.diff(first) > 0).all() else None
 
 
 def _join_any(stamps: Mapping[int, Stamps], closing: int) -> Epochs:
@@ -117,7 +140,7 @@ def _join_any(stamps: Mapping[int, Stamps], closing: int) -> Epochs:
     row_of: dict[int, Any] = dict(zip(numbers, np.split(row, ends[:-1]), strict=True))
     duplicate = np.ones(len(time_ms), np.bool_)
     duplicate[np.unique(time_ms, return_index=True)[1]] = False
-    return Epochs(time_ms, row_of, duplicate)
+    return Epochs(time_ms, position[order][kept][first[by_place]], row_of, duplicate)
 
 
 def _split_repeats(run: Index, kind: Index, kinds: int) -> Index:

@@ -21,6 +21,7 @@ from sbas.logs.septentrio.sbf_blocks import SYNC
 from sbas.logs.septentrio.sbf_framing import HEADER_BYTES, MIN_LENGTH, read_span
 
 PIECE_BYTES = 4 << 20
+MANY_STRETCHES = 1 << 16
 _LONGEST_FRAME = 1030
 _OFFSETS_KEPT = 5
 _CROWDED = 16
@@ -70,15 +71,48 @@ def _rtcm_spans(data: bytes) -> list[tuple[int, int]]:
     return [span for span, right in zip(spans, good.tolist(), strict=True) if right]
 
 
-def count_foreign(path: Path, start: Positions, end: Positions) -> Foreign:
-    """Count the sentences, frames and orphan bytes in the stretches [start, end) of a file.
+class Leftovers:
+    """What lies between the blocks of a file, counted while it is read.
+
+    The last stretch waits until the end: a block that the end of the file cuts may be in it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._found = Foreign()
+        self._start = self._end = np.empty(0, np.int64)
+
+    def add(self, start: Positions, end: Positions) -> None:
+        """Take note of (n,) stretches [start, end) that are no block, in file order."""
+        self._start = np.concatenate((self._start, start))
+        self._end = np.concatenate((self._end, end))
+        if len(self._start) > MANY_STRETCHES:
+            count_foreign(self.path, self._start[:-1], self._end[:-1], self._found)
+            self._start, self._end = self._start[-1:], self._end[-1:]
+
+    def finish(self) -> tuple[Foreign, tuple[int, int] | None]:
+        """Counts over all stretches, and place and stated length of a cut last block if any."""
+        size = self.path.stat().st_size
+        cut = None
+        if len(self._end) and self._end[-1] == size:
+            cut = cut_block(self.path, int(self._start[-1]), size)
+        if cut is not None:
+            self._end[-1] = cut[0]
+        count_foreign(self.path, self._start, self._end, self._found)
+        return self._found, cut
+
+
+def count_foreign(path: Path, start: Positions, end: Positions, found: Foreign) -> None:
+    """Add the sentences, frames and orphan bytes in the stretches [start, end) of a file.
 
     Parameters
     ----------
     path : the file.
     start, end : (n,) stretches that are no SBF block, in file order.
+    found : counts that grow; stretches before these are in them already.
     """
-    found = Foreign()
+    if not len(start):
+        return
     with path.open("rb", buffering=0) as file:
         low = 0
         while low < len(start):
@@ -94,7 +128,6 @@ def count_foreign(path: Path, start: Positions, end: Positions) -> Foreign:
                 else:
                     _count_long(file, first, after, found)
             low = high
-    return found
 
 
 def _count_long(file: FileIO, first: int, after: int, found: Foreign) -> None:

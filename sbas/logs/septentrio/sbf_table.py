@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Set
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Set
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,9 @@ DILUTION = (sbf.DOP, sbf.DOP_V1)
 RAIM = (sbf.RAIM_STATISTICS, sbf.RAIM_STATISTICS_V1)
 KINDS = (PVT, COVARIANCE, DILUTION, RAIM)
 """Block numbers that say the same, the preferred one first: each epoch takes one of each."""
+_CLOSED = len(KINDS)
+_COVERAGES = 1 << (_CLOSED + 1)
+"""Sets of what an epoch has: a bit a kind of `KINDS`, and one for EndOfPVT."""
 
 DO229_SIGNALS = 1 << 0 | 1 << 24
 """SignalInfo of a DO-229 L1 fix: GPS L1 C/A and SBAS L1."""
@@ -46,15 +49,49 @@ class Levels:
     many_satellites: int
     certain: int
 
+    def __add__(self, other: Levels) -> Levels:
+        return Levels(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+
+def no_coverage() -> NDArray[np.int64]:
+    """Counts of no epoch, by the set of kinds of block that an epoch has; see `kinds_of`."""
+    return np.zeros(_COVERAGES, np.int64)
+
 
 @dataclass
 class Filled:
-    """Columns by name, what was made missing, and how many epochs lack a block."""
+    """Columns by name, what was made missing, and what the epochs have.
 
-    columns: dict[str, Any] = field(default_factory=dict)
-    removed: decode.Removed = field(default_factory=Counter)
-    incomplete: int = 0
+    `has` is the set of kinds of block that each epoch has, and `coverage` counts the epochs by
+    it; see `kinds_of`.
+    """
+
+    columns: dict[str, Any]
+    removed: decode.Removed
+    has: NDArray[np.uint8]
     levels: Levels | None = None
+
+    @property
+    def coverage(self) -> NDArray[np.int64]:
+        return np.bincount(self.has, minlength=_COVERAGES)
+
+
+def kinds_of(numbers: Iterable[int]) -> int:
+    """The set of kinds of block that a file with these block numbers has, as bits."""
+    present = set(numbers)
+    bits = sum(1 << kind for kind, alike in enumerate(KINDS) if present & set(alike))
+    return bits | (sbf.END_OF_PVT in present) << _CLOSED
+
+
+def incomplete(has: NDArray[np.uint8], kinds: int) -> NDArray[np.bool_]:
+    """(n,) whether epochs lack one of the kinds of block."""
+    lacking: NDArray[np.bool_] = (has & kinds) != kinds
+    return lacking
+
+
+def incomplete_epochs(coverage: NDArray[np.int64], kinds: int) -> int:
+    """How many epochs lack one of the kinds, by the counts of `Filled.coverage`."""
+    return int(coverage[incomplete(np.arange(_COVERAGES, dtype=np.uint8), kinds)].sum())
 
 
 def empty_column(name: str, rows: int) -> Any:
@@ -63,7 +100,7 @@ def empty_column(name: str, rows: int) -> Any:
 
 
 def fill_table(epochs: Epochs, raw: Mapping[int, Raw], want: Set[str]) -> Filled:
-    """Columns of the epoch table.
+    """Columns of the epoch table; flags without those that depend on other parts of the file.
 
     Parameters
     ----------
@@ -73,7 +110,6 @@ def fill_table(epochs: Epochs, raw: Mapping[int, Raw], want: Set[str]) -> Filled
     """
     rows = len(epochs.time_ms)
     build = _Build(rows, epochs, raw, want)
-    missing = np.zeros(rows, np.bool_)
     decoders = (
         build.decode_pvt, build.decode_covariance,
         lambda _, fields, __: decode.dilution(fields, want),
@@ -82,18 +118,18 @@ def fill_table(epochs: Epochs, raw: Mapping[int, Raw], want: Set[str]) -> Filled
     covered = [
         build.fill_kind(numbers, decoder) for numbers, decoder in zip(KINDS, decoders, strict=True)
     ]
-    if sbf.END_OF_PVT in raw:
-        covered.append(build.covered_by(epochs.row_of[sbf.END_OF_PVT]))
-    for some in covered:
+    closed = build.covered_by(epochs.row_of[sbf.END_OF_PVT]) if sbf.END_OF_PVT in raw else None
+    has = np.zeros(rows, np.uint8)
+    for kind, some in enumerate((*covered, closed)):
         if some is not None:
-            missing |= ~some
-    out = Filled(build.columns, build.removed, int(missing.sum()))
+            has |= some.astype(np.uint8) << kind
+    out = Filled(build.columns, build.removed, has)
     if "mode" in build.columns:
         out.columns["mode"] = mode_categories(build.columns["mode"])
     if want & {"hpl_m", "vpl_m"}:
         out.levels = build.levels()
     if "flags" in want:
-        out.columns["flags"] = build.flags_of_rows(missing, covered[KINDS.index(RAIM)])
+        out.columns["flags"] = build.flags_of_rows(covered[KINDS.index(RAIM)])
     return out
 
 
@@ -193,13 +229,10 @@ class _Build:
         counts = (present, outside, other, many, certain)
         return Levels(*(int(np.count_nonzero(rows)) for rows in counts))
 
-    def flags_of_rows(
-        self, missing: NDArray[np.bool_], with_raim: NDArray[np.bool_] | None
-    ) -> NDArray[np.uint32]:
+    def flags_of_rows(self, with_raim: NDArray[np.bool_] | None) -> NDArray[np.uint32]:
         flags = self.flags
         alert = decode.ALERT_FLAGS[self.alert & 3]
         flags |= alert if with_raim is None else np.where(with_raim, np.uint32(0), alert)
-        flags |= missing * np.uint32(Flag.EPOCH_INCOMPLETE)
         if "mode" in self.columns:
             flags |= pl_outside_sbas(self.columns)
         if self.epochs.duplicate is not None:

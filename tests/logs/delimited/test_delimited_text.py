@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from sbas.exceptions import InputError
 from sbas.logs.delimited import delimited_text
-from sbas.recording import MODES, Flag, Recording
+from sbas.logs.epoch_spool import SpooledEpochs
+from sbas.recording import MODES, EpochSource, Flag, Recording
 
 T = "2025-05-23 14:09:1"
 
@@ -525,3 +526,176 @@ def test_units_in_a_later_file_alone_are_refused(tmp_path: Path) -> None:
             read(tmp_path, HEADER + FIRST + HEADER + units + FIRST)
         with pytest.raises(InputError, match="two layouts"):
             read(tmp_path, HEADER + units + FIRST + HEADER + FIRST)
+
+
+# Options of the caller
+
+
+@pytest.mark.parametrize(
+    ("text", "decimal", "hpl"),
+    [
+        (f"time;hpl\n{T}6;11,5\n", ",", [11.5]),
+        ("week tow hpl\n1549 518400,25 11,5\n", ",", [11.5]),
+        (f'time,hpl\n{T}6,"11,5"\n', ",", [11.5]),
+        (f"time;hpl\n{T}6;11,5\n{T}7;12.5\n", ",", [11.5, math.nan]),
+        (f"time;hpl\n{T}6;11,5\n{T}7;12.5\n", ".", [math.nan, 12.5]),
+        (f"time;hpl\n{T}6;1.250\n{T}7;12,5\n", ",", [math.nan, 12.5]),  # 1250 or 1.25
+    ],
+)
+def test_the_decimal_sign_as_asked(
+    tmp_path: Path, text: str, decimal: str, hpl: list[float]
+) -> None:
+    recording = read(tmp_path, text, decimal=decimal)
+    np.testing.assert_array_equal(recording.table["hpl_m"], hpl)
+    expected = [("E10", "error")] if any(map(math.isnan, hpl)) else []
+    assert codes(recording) == expected
+
+
+def test_decimal_commas_between_commas_stay_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="E20"):
+        read(tmp_path, f"time,lat,lon\n{T}6,50,5,15,25\n{T}7,50,6,15,35\n", decimal=",")
+    with pytest.raises(InputError, match="decimal sign") as caught:
+        read(tmp_path, f"time,lat\n{T}6,50.5\n", decimal="'")
+    assert "--decimal ," in caught.value.cure
+
+
+def test_undecided_decimals_name_the_option(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="E20") as caught:
+        read(tmp_path, f"time;lat;hpl\n{T}6;50,5;11.5\n")
+    assert "--decimal ," in caught.value.cure
+
+
+def test_the_encoding_as_asked(tmp_path: Path) -> None:
+    text = f"time,x_místo,hpl\n{T}6,Děčín,11.5\n"
+    recording = read(tmp_path, text.encode("cp1250"), encoding="cp1250")
+    assert recording.table["x_místo"].tolist() == ["Děčín"]
+    assert codes(recording) == []
+    assert codes(read(tmp_path, text.encode("cp1250")))[0] == ("E19", "warning")
+
+
+def test_long_lines_as_asked(tmp_path: Path) -> None:
+    text = f"time,hpl,x_note\n{T}6,11.5,{'a' * 100_000}\n"
+    with pytest.raises(InputError, match="E18"):
+        read(tmp_path, text)
+    assert len(read(tmp_path, text, max_line=200_000)) == 1
+
+
+# Long files: piece by piece as at once
+
+
+def scan(folder: Path, text: str | bytes, **options: object) -> EpochSource:
+    path = folder / "table.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(delimited_text, "WHOLE_BYTES", 0)
+        patch.setattr("sbas.logs.epoch_spool.PIECE_ROWS", 3)
+        patch.setattr("sbas.logs.text_input.BLOCK_BYTES", 150)
+        return delimited_text.scan(path, **options)  # type: ignore[arg-type]
+
+
+def same(folder: Path, text: str | bytes, **options: object) -> None:
+    """That a file says the same at once and piece by piece."""
+    whole: Recording | InputError
+    with pytest.MonkeyPatch.context() as patch:
+        # Here too: the layout is told from the first block, which is never so small in fact.
+        patch.setattr("sbas.logs.text_input.BLOCK_BYTES", 150)
+        try:
+            whole = read(folder, text, **options)
+        except InputError as error:
+            whole = error
+    if isinstance(whole, InputError):
+        with pytest.raises(InputError) as caught:
+            scan(folder, text, **options)
+        assert caught.value.code == whole.code
+        return
+    source = scan(folder, text, **options)
+    assert isinstance(source, SpooledEpochs)
+    assert source.columns == whole.columns
+    assert source.meta == whole.meta
+    pd.testing.assert_frame_equal(pd.concat(source.batches(source.columns)), whole.table)
+
+
+CELLS = {
+    "lat": ["50.5", "0", "", "-2e10", "x"],
+    "lon": ["15.5", "0", "350.5", "-9.5", ""],
+    "hpl": ["11.5", "65535", "8000", "inf", "nan", "1,5"],
+    "vpl": ["20.5", "100", "655.35"],
+    "alt": ["245.5", "nan", ""],
+    "n_sv": ["9", "8.5", "255", "-1"],
+    "mode": ["sbas", "rtk", ""],
+    "environment": ["open", "cutting", "", "tunnel"],
+    "hardware_fault": ["true", "0", ""],
+    "note": ["1.5", "a", "", "NaN"],
+    "flags": ["0", "8", ""],
+}
+STAMPS = ["2025-05-23 14:09:{:02d}", "2025-05-23 14:09:{:02d}Z", "2016-12-31 23:59:60", "x"]
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> str:
+    names = draw(st.lists(st.sampled_from(sorted(CELLS)), min_size=1, max_size=5, unique=True))
+    common = {name: draw(st.sampled_from(CELLS[name])) for name in names}
+    header = ",".join([draw(st.sampled_from(["time", "utc"])), *names])
+    stamp = draw(st.sampled_from(STAMPS[:3]))
+    lines = [header]
+    for k in range(draw(st.integers(1, 25))):
+        # Mostly like the line before, so that what is odd comes late.
+        odd = draw(st.integers(0, 5)) == 0
+        cells = [draw(st.sampled_from(CELLS[n])) if odd else common[n] for n in names]
+        when = draw(st.sampled_from(STAMPS)) if odd and draw(st.booleans()) else stamp
+        line = ",".join([when.format(k), *cells])
+        lines.append(line[: draw(st.integers(1, len(line)))] if odd and k % 5 == 0 else line)
+    return "\n".join(lines) + draw(st.sampled_from(["", "\n", "\n" + header + "\n"]))
+
+
+@given(tables(), st.sampled_from([{}, {"geoid": 44.5}, {"time_scale": "UTC"}]))
+def test_piece_by_piece_is_as_at_once(
+    tmp_path_factory: pytest.TempPathFactory, text: str, options: dict[str, object]
+) -> None:
+    same(tmp_path_factory.mktemp("pieces"), text, **options)
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "odd"),
+    [
+        ("lon", "350.5", "10.5"),
+        ("lon", "10.5", "350.5"),  # the convention shows late
+        ("lon", "350.5", "-10.5"),  # no such convention after all
+        ("lat,lon", "50.5,350.5", "0,0"),
+        ("note", "1.5", "b"),  # text after all
+        ("note", "b", "1.5"),
+        ("environment", "open", "cutting"),
+        ("hpl", "11.5", "-2e10"),
+        ("alt", "245.5", ""),
+        ("hpl", "70000", "11.5"),
+    ],
+)
+@pytest.mark.parametrize("at", [0, 5, 11])
+def test_what_shows_late_counts_for_the_whole(
+    tmp_path: Path, header: str, row: str, odd: str, at: int
+) -> None:
+    rows = [odd if k == at else row for k in range(12)]
+    lines = [f"2025-05-23 14:09:{k:02d},{cells}\n" for k, cells in enumerate(rows)]
+    same(tmp_path, f"time,{header}\n" + "".join(lines))
+    same(tmp_path, f"time,{header}\n" + "".join(lines), columns=["lon_deg", "hpl_m"])
+
+
+def test_stamps_with_a_zone_late_are_refused(tmp_path: Path) -> None:
+    lines = [f"2025-05-23 14:09:{k:02d}{'Z' * (k == 11)},50.5\n" for k in range(12)]
+    with pytest.raises(InputError, match="some times name a zone"):
+        scan(tmp_path, "time,lat\n" + "".join(lines))
+
+
+def test_a_short_file_is_read_whole(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text(f"time,lat\n{T}6,50.5\n")
+    assert isinstance(delimited_text.scan(path), Recording)
+
+
+def test_a_long_file_restricted_to_columns(tmp_path: Path) -> None:
+    rows = "".join(f"2025-05-23 14:09:{k:02d},50.5,15.5,{k}.5\n" for k in range(20))
+    source = scan(tmp_path, "time,lat,lon,hpl\n" + rows, columns=["hpl_m"])
+    assert source.columns == ("hpl_m",)
+    batches = list(source.batches(["hpl_m", "n_sv"]))
+    assert len(batches) > 1
+    assert pd.concat(batches)["hpl_m"].tolist() == [k + 0.5 for k in range(20)]

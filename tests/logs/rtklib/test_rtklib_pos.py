@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from sbas.exceptions import InputError
+from sbas.logs.epoch_spool import SpooledEpochs
 from sbas.logs.rtklib import rtklib_pos
 from sbas.recording import Flag, Recording
 
@@ -410,3 +412,85 @@ def test_velocities_and_sigmas_that_lack_one_are_read(tmp_path: Path) -> None:
     recording = read(tmp_path, FRAME + header + row)
     assert recording.table["vel_e_mps"].tolist() == [2.0]
     assert "sigma_u_m" not in recording.table
+
+
+# Long files: piece by piece as at once
+
+
+def same(folder: Path, text: str, **options: object) -> None:
+    """That a file says the same at once and piece by piece."""
+    try:
+        whole = read(folder, text, **options)
+    except InputError as error:
+        whole, code = None, error.code
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rtklib_pos, "WHOLE_BYTES", 0)
+        patch.setattr("sbas.logs.epoch_spool.PIECE_ROWS", 3)
+        patch.setattr("sbas.logs.text_input.BLOCK_BYTES", 700)
+        if whole is None:
+            with pytest.raises(InputError) as caught:
+                rtklib_pos.scan(folder / "solution.pos", **options)  # type: ignore[arg-type]
+            assert caught.value.code == code
+            return
+        source = rtklib_pos.scan(folder / "solution.pos", **options)  # type: ignore[arg-type]
+    assert isinstance(source, SpooledEpochs)
+    assert source.columns == whole.columns
+    assert source.meta == whole.meta
+    pd.testing.assert_frame_equal(pd.concat(source.batches(source.columns)), whole.table)
+
+
+LEVEL_CELLS = [
+    "  27.30   45.5",
+    "   0.00    0.0",
+    "8000 100",
+    "65535 45.5",
+    "nan 45.5",
+    "27.3",
+    "x 1",
+]
+
+
+@given(
+    st.lists(st.sampled_from([0] * 12 + [1, 2, 3, 4, 5, 6]), min_size=1, max_size=40),
+    st.sampled_from(["GPST", "UTC ", "JST "]),
+    st.sampled_from(["ellipsoidal", "geodetic"]),
+    st.sampled_from([{}, {"geoid": 44.5}, {"columns": ["hpl_m"]}]),
+    st.integers(0, 30),
+)
+def test_piece_by_piece_is_as_at_once(
+    tmp_path_factory: pytest.TempPathFactory,
+    levels: list[int],
+    scale: str,
+    height: str,
+    options: dict[str, object],
+    cut: int,
+) -> None:
+    rows = "".join(
+        ROW.replace(":13.", f":{k:02d}.") + LEVEL_CELLS[cell] + "\n"
+        for k, cell in enumerate(levels)
+    )
+    text = FRAME.replace("ellipsoidal", height) + LEVELS.replace("GPST", scale) + rows
+    same(tmp_path_factory.mktemp("pieces"), text[: len(text) - cut], **options)
+
+
+@pytest.mark.parametrize("late", ["26.30", "27.30"])
+def test_the_kind_of_levels_is_that_of_all_pieces(tmp_path: Path, late: str) -> None:
+    # d_major of ROW is 4.55: 27.30 is 6.00 times it.
+    row = ROW + "  27.30   45.5\n"
+    rows = "".join(row.replace(":13.", f":{k:02d}.") for k in range(20))
+    rows += row.replace("27.30", late).replace(":13.", ":59.")
+    same(tmp_path, FRAME + LEVELS + rows)
+    kind = read(tmp_path, FRAME + LEVELS + rows).meta.pl.kind
+    assert kind == ("do229" if late == "27.30" else "unknown")
+
+
+def test_the_reference_hour_piece_by_piece(tmp_path: Path, reference_data: Path) -> None:
+    path = reference_data / "data/egnos_debrecen_2016194/debr194m.pos"
+    same(tmp_path, path.read_text())
+
+
+def test_the_encoding_and_long_lines_as_asked(tmp_path: Path) -> None:
+    text = FRAME + LEVELS + ROW + "  27.30   45.5\n"
+    assert len(read(tmp_path, text.encode("utf-16-le"), encoding="utf-16-le")) == 1
+    with pytest.raises(InputError, match="E18"):
+        read(tmp_path, text, max_line=50)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from binascii import crc_hqx
 
 import numpy as np
@@ -87,3 +88,62 @@ def reference_blocks(data: bytes) -> list[tuple[int, int, bytes]]:
         else:
             at = data.find(b"$@", at + 2)
     return found
+
+
+def with_sub_blocks(number: int, tow_ms: int, head: bytes, *sub_blocks: bytes) -> bytes:
+    """A block of any number: what follows the time, then sub-blocks as they are."""
+    body = b"".join(sub_blocks)
+    rest = tow_ms.to_bytes(4, "little") + WEEK.to_bytes(2, "little") + head + body
+    rest += bytes(-(len(rest) + 8) % 4)
+    rest = number.to_bytes(2, "little") + (len(rest) + 8).to_bytes(2, "little") + rest
+    return b"$@" + crc_hqx(rest, 0).to_bytes(2, "little") + rest
+
+
+def positions_block(
+    tow_ms: int, satellites: dict[int, tuple[float, float, float]], *, size: int = 48
+) -> bytes:
+    """PVTSatCartesian: SVID -> position; revision 0 (40 bytes a satellite), 1 (48) or later."""
+    rows = [
+        struct.pack("<BBHddd", svid, 0, 7, *xyz).ljust(size, b"\xaa")
+        for svid, xyz in satellites.items()
+    ]
+    number = 4008 | (1 << 13 if size > 40 else 0)
+    return with_sub_blocks(number, tow_ms, bytes([len(rows), size]), *rows)
+
+
+def corrections_block(
+    tow_ms: int, satellites: dict[int, tuple[float, float, float, float]], *, size: int = 64
+) -> bytes:
+    """GEOCorrections: SVID -> variances (corrections, ionosphere, receiver, troposphere)."""
+    rows = [
+        struct.pack("<BB2x11f4f", svid, 9, *range(11), *variances)[:size].ljust(size, b"\xbb")
+        for svid, variances in satellites.items()
+    ]
+    return with_sub_blocks(5935, tow_ms, bytes([len(rows), size]), *rows)
+
+
+def signal(
+    svid: int,
+    *,
+    signal: int = 0,
+    antenna: int = 0,
+    kind: int = 1,
+    code: tuple[float, int, int] | None = None,
+    phase: tuple[float, int, int] | None = None,
+    doppler: tuple[float, int, int] | None = None,
+    sizes: tuple[int, int] = (12, 8),
+) -> bytes:
+    """One signal of PVTResiduals with its residuals: (residual, W, MDB) raw."""
+    residuals = [code, phase, doppler]
+    info = kind | sum(4 << i for i, values in enumerate(residuals) if values is not None)
+    first = struct.pack("<6BHHH", svid, 0, signal | antenna << 5, 255, 255, info, 5, 100, 120)
+    return first.ljust(sizes[0], b"\xcc") + b"".join(
+        struct.pack("<fHH", *values).ljust(sizes[1], b"\xdd")
+        for values in residuals
+        if values is not None
+    )
+
+
+def residuals_block(tow_ms: int, *signals: bytes, sizes: tuple[int, int] = (12, 8)) -> bytes:
+    """PVTResiduals version 2."""
+    return with_sub_blocks(4009 | 1 << 13, tow_ms, bytes([len(signals), *sizes, 0, 0, 0]), *signals)

@@ -15,9 +15,15 @@ from hypothesis import strategies as st
 from sbas.findings import Finding
 from sbas.logs.septentrio import septentrio_sbf
 from sbas.logs.septentrio.sbf_writer import write
-from sbas.logs.septentrio.septentrio_sbf import FORMAT, read, read_in_chunks, sniff
+from sbas.logs.septentrio.septentrio_sbf import FORMAT, read, read_in_chunks, scan, sniff
 from sbas.recording import Flag, Recording, major_semi_axis_m
-from tests.logs.septentrio.sbf_samples import WEEK, block, opaque_block, recording
+from tests.logs.septentrio.sbf_samples import (
+    WEEK,
+    block,
+    opaque_block,
+    recording,
+    with_sub_blocks,
+)
 
 DOP_REAL = bytes.fromhex("244057f9a10f2000e052c91c3f0925004f0028002c004200f5e77840fc96b540")
 RTCM_1005 = bytes.fromhex("d300133ed7d30202980edeef34b4bd62ac0941986f33360b98")
@@ -129,6 +135,7 @@ def test_sniff_counts_blocks_not_their_copies() -> None:
     assert sniff(NMEA * 9, b"", NMEA, path).score == 0
     assert FORMAT.sniff is sniff
     assert FORMAT.read is read
+    assert FORMAT.scan is scan
     assert FORMAT.write is write
 
 
@@ -549,16 +556,34 @@ def test_receiver_time(load) -> None:  # type: ignore[no-untyped-def]
     r = load(clock(0, 15), epoch(0), clock(1000, 15))
     assert r.meta.leap_seconds == 15
     assert "E25" not in dict(codes(r))
-    r = load(clock(0, -128, 3), epoch(0), clock(1000, 14), clock(2000, 15))
+    assert "E11" not in dict(codes(r))
+    # Week 1549 begins on 2009-09-13; a value that is not known is no change.
+    r = load(clock(0, -128, 3), epoch(0), clock(1000, 14), clock(1500, -128), clock(2000, 15))
     assert r.meta.leap_seconds == 15
-    assert "14 s, 15 s" in finding(r, "E25", "several").evidence
-    assert "1 of 3" in finding(r, "E25", "clock").evidence
+    found = finding(r, "E11")
+    assert found.severity == "error"
+    assert found.evidence == "2009-09-13T00:00:02 GPST: 14 s to 15 s, k = +1"
+    assert "1 of 4" in finding(r, "E25", "clock").evidence
+    r = load(*(clock(1000 * i, 14 + i % 3) for i in range(9)))
+    assert finding(r, "E11").evidence.endswith("k = -2; 2009-09-13T00:00:04 GPST: 14 s to 15 s, "
+                                               "k = +1; 2009-09-13T00:00:05 GPST: 15 s to 16 s, "
+                                               "k = +1; and 3 more")  # fmt: skip
 
 
 def test_frame_of_reference(load) -> None:  # type: ignore[no-untyped-def]
     assert load(epoch(0, datum=0)).meta.frame == "WGS84"
     assert load(epoch(0, datum=0), epoch(1000, datum=19)).meta.frame == ""
     assert load(DOP_REAL).meta.frame == ""
+
+
+def test_antenna(load) -> None:  # type: ignore[no-untyped-def]
+    """Positions are those of the marker; Misc bits 6-7: whether it is the ARP (guide, p. 400)."""
+    unknown, same, off = (epoch(0, misc=bits << 6 | 3) for bits in (0, 1, 2))
+    for blocks, antenna in (
+        ((unknown,), "marker"), ((same,), "marker, which is the ARP"),
+        ((off,), "marker, off the ARP"), ((same, off), "marker"), ((DOP_REAL,), "marker"),
+    ):  # fmt: skip
+        assert load(*blocks).meta.antenna == antenna
 
 
 def test_frames_of_both_signals(load) -> None:  # type: ignore[no-untyped-def]
@@ -627,6 +652,9 @@ PIECES = st.one_of(
         st.integers(0, 7), st.binary(max_size=90), st.integers(0, 3),
     ),
     st.builds(lambda t, lat: epoch(t, lat=lat), st.integers(0, 3), st.floats()),
+    st.builds(lambda number, head, body: with_sub_blocks(number, 0, bytes(head), body),
+              st.sampled_from([4008, 4009, 5935]),
+              st.lists(st.integers(0, 80), max_size=6), st.binary(max_size=200)),
 )  # fmt: skip
 
 

@@ -1,0 +1,1 @@
+"""NMEA 0183: sentences of any talker, and the proprietary PASHR,POS and PUBX,00."""
