@@ -11,13 +11,15 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from sbas.environment_labels import EnvironmentSegments, label_epochs, load_segments
 from sbas.estimate import Estimate, Refusal
 from sbas.exceptions import InputError, ModelError, SbasError
 from sbas.findings import Finding
-from sbas.input_check import check, repair
-from sbas.logs import read, read_truth_table, scan
+from sbas.input_check import Repairs, check, repair
+from sbas.logs import load_track, read, read_truth_table, scan
 from sbas.recording import Recording, RecordingMeta
-from sbas.truth import FixedPoint, Trajectory
+from sbas.track import Track, TrackLine
+from sbas.truth import FixedPoint, Trajectory, transformed
 from sbas.version import __version__
 
 if TYPE_CHECKING:
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from sbas.reporting import report
 
 __all__ = [
+    "EnvironmentSegments",
     "Estimate",
     "Finding",
     "FixedPoint",
@@ -48,7 +51,10 @@ __all__ = [
     "Recording",
     "RecordingMeta",
     "Refusal",
+    "Repairs",
     "SbasError",
+    "Track",
+    "TrackLine",
     "Trajectory",
     "__version__",
     "check",
@@ -61,8 +67,11 @@ __all__ = [
     "k_factor",
     "k_models",
     "k_verdict",
+    "label_epochs",
     "load_allocation",
     "load_models",
+    "load_segments",
+    "load_track",
     "plan_hours",
     "position_errors",
     "railway_hpl",
@@ -73,6 +82,7 @@ __all__ = [
     "report",
     "scan",
     "simulate",
+    "transformed",
 ]
 
 _LATER = {

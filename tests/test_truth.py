@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
+import pymap3d
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from sbas.exceptions import InputError
 from sbas.integrity.position_error import position_errors
-from sbas.truth import FixedPoint, Trajectory
+from sbas.recording import RecordingMeta
+from sbas.track import Track, TrackLine
+from sbas.truth import FixedPoint, Trajectory, frame_findings, transformed
 
 A, F = 6_378_137.0, 1 / 298.257223563
 E2 = F * (2 - F)
@@ -145,3 +150,108 @@ def test_noise_on_points_close_together_makes_no_overshoot() -> None:
     lon = np.degrees(20.0 * (np.arange(39) + 0.5) / A)
     away = np.hypot(np.radians(truth.lon_deg - lon) * A, np.radians(truth.lat_deg) * A)
     assert away.max() < 0.05
+
+
+def test_a_point_in_another_frame_grows_less_certain() -> None:
+    point = FixedPoint(50.03, 15.77, 289.4, antenna_height_m=1.5, frame="S-JTSK")
+    moved = transformed(point, "S-JTSK>ETRS89>ITRF2014@2025.5")
+    # EPSG states 1 m and 0.1 m for the two steps.
+    assert moved.sigma_h_m == pytest.approx(np.sqrt(0.02**2 + 1.0**2 + 0.1**2))
+    assert moved.sigma_v_m == pytest.approx(np.sqrt(0.03**2 + 1.0**2 + 0.1**2))
+    assert moved.frame == "ITRF2014 2025.5"
+    assert moved.antenna_height_m == 1.5
+    assert "S-JTSK to ETRS89 (1)" in moved.label
+    # The datum shift of S-JTSK is some 80 m to the south and 90 m to the west (EPSG 1623).
+    assert (moved.lat_deg - 50.03) * 111_200 == pytest.approx(-80, abs=10)
+    assert (moved.lon_deg - 15.77) * 71_500 == pytest.approx(-91, abs=10)
+
+
+def test_trajectory_and_track_move_as_the_points_do() -> None:
+    table = track(5).assign(lat_deg=50.03, sigma_h_m=[0.1, 0.2, 0.3, 0.4, np.nan])
+    change = "ETRF2000>ITRF2014@2025.5"
+    moved = transformed(Trajectory(table, frame="ETRF2000"), change)
+    line = Track((table[["lat_deg", "lon_deg", "height_m"]].to_numpy(),), sigma_m=0.3)
+    part = transformed(line, change).parts[0]
+    flat = Track((np.where([True, True, False], line.parts[0], np.nan),))
+    for i, place in enumerate(line.parts[0]):
+        one = transformed(FixedPoint(*place), change)
+        expected = (one.lat_deg, one.lon_deg, one.height_m)
+        assert tuple(moved.table.iloc[i, :3]) == pytest.approx(expected, abs=1e-9)
+        assert tuple(part[i]) == pytest.approx(expected, abs=1e-9)
+    assert np.isnan(transformed(flat, change).parts[0][:, 2]).all()
+    assert moved.table["sigma_h_m"].tolist()[:4] == [0.1, 0.2, 0.3, 0.4]  # EPSG: accuracy 0 m
+    assert moved.frame == "ITRF2014 2025.5"
+    assert "ETRF2000 to ITRF2014 at 2025.5" in moved.label
+    truth = transformed(TrackLine(line), change)
+    assert truth.frame == "ITRF2014 2025.5"
+    assert "ITRF2014" in truth.label
+    own = transformed(Trajectory(table, frame="ETRF2000"), "ETRF2000>ITRF2014")
+    assert own.frame == "ITRF2014 2020"  # the points' own epoch
+
+
+@pytest.mark.parametrize(
+    ("frame", "change"),
+    [
+        ("ITRF2014 2010.0", "ETRF2000>ITRF2014@2025.5"),
+        ("ITRF2014 2010.0", "ITRF2014 2012.0>ETRF2014>ITRF2014@2025.5"),
+        ("ITRF2014 2010.0", "ITRF2014>ETRF2014@2025.5"),
+        ("nowhere", "ETRF2000>ITRF2014@2025.5"),
+    ],
+)
+def test_a_transformation_must_begin_where_the_truth_is(frame: str, change: str) -> None:
+    with pytest.raises(InputError):
+        transformed(FixedPoint(50.03, 15.77, 289.4, frame=frame), change)
+
+
+def test_findings_on_frames() -> None:
+    meta = RecordingMeta(frame="WGS84")
+    point = FixedPoint(50.03, 15.77, 289.4)
+    (unstated,) = frame_findings(meta, point)
+    assert (unstated.code, unstated.severity) == ("E09", "warning")
+    assert "not stated" in unstated.message
+    (other,) = frame_findings(meta, replace(point, frame="ETRF2000"), year=2026.5)
+    assert "ETRF2000>ITRF2014@2026.5" in other.cure
+    (odd,) = frame_findings(meta, replace(point, frame="ETRF200"))
+    assert "ETRF2000" in odd.evidence
+    assert frame_findings(meta, replace(point, frame="ITRF2014 2026.2"), year=2026.5) == ()
+    assert frame_findings(meta, None) == ()
+    assert frame_findings(meta, replace(point, lower_bound=True)) == ()
+
+
+def test_heading_turns_the_short_way_and_never_across_a_gap() -> None:
+    table = track(6, step_s=1.0).assign(heading_deg=[350.0, 10.0, 20.0, 200.0, np.nan, 5.0])
+    truth = Trajectory(table)
+    start = np.datetime64("2020-01-01", "ns")
+    at = start + (np.array([0.25, 0.5, 1.0, 1.75, 2.5, 3.0, 3.5, -1.0, 9.0]) * 1e9).astype("m8[ns]")
+    np.testing.assert_allclose(
+        truth.heading_deg(at), [355.0, 0.0, 10.0, 17.5, np.nan, 200.0, np.nan, np.nan, np.nan]
+    )
+    assert np.isnan(Trajectory(track(6)).heading_deg(at)).all()
+    slow = Trajectory(table.iloc[::2], max_step_s=1.0)
+    assert np.isnan(slow.heading_deg(at[:2])).all()
+
+
+def test_direction_of_motion_on_a_circle() -> None:
+    # 20 m/s on a circle of 300 m: the azimuth grows by 20/300 rad a second.
+    second = np.arange(60.0)
+    angle = second * 20 / 300
+    lat, lon, height = pymap3d.enu2geodetic(
+        300 * np.sin(angle), 300 * np.cos(angle), 0 * angle, 50.0, 15.0, 0.0
+    )
+    index = pd.DatetimeIndex(
+        np.datetime64("2020-01-01", "ns") + (second * 1e9).astype("m8[ns]"), name="time"
+    )
+    truth = Trajectory(pd.DataFrame({"lat_deg": lat, "lon_deg": lon, "height_m": height}, index))
+    at = index.to_numpy()[1:-1]
+
+    def error(at: np.ndarray, angle: np.ndarray) -> float:
+        away = truth.motion_deg(at, above_mps=1.0) - 90 - np.degrees(angle)
+        return float(np.abs((away + 180) % 360 - 180).max())
+
+    # A chord is parallel to the tangent at its middle; 300 m east of the plane's origin its north
+    # is 300 m x tan(50 deg) / R = 0.0032 deg off.
+    assert error(at, angle[1:-1]) < 4e-3
+    between = at[1:-1] + np.timedelta64(400, "ms")
+    assert error(between, angle[2:-2] + 0.4 * 20 / 300) < 0.5
+    assert np.isnan(truth.motion_deg(at, above_mps=21.0)).all()
+    assert np.isnan(truth.motion_deg(index.to_numpy()[:1], above_mps=1.0)[0])

@@ -37,20 +37,13 @@ def compare(
 
     Example:  sbas compare pa.sbf npa.sbf --truth 50.03,15.77,289.4
     """
-    known = inputs.open_truth(truth, reading)
     first, second = (
-        inputs.open_source(
-            [path],
-            reading,
-            repairing,
-            quiet=quiet,
-        )
-        for path in (a, b)
+        inputs.open_recording([path], truth, reading, repairing, quiet=quiet) for path in (a, b)
     )
     result = compare_sources(
-        first,
-        second,
-        truth=known,
+        first.source,
+        second.source,
+        truth=first.truth,
         alert_limits_m=inputs.alert_limits(alert_limit),
         tau_s=tau_s,
         confidence=confidence,

@@ -70,20 +70,12 @@ def evaluate_files(
     """
     limits = inputs.alert_limits(alert_limit)
     if report is not None:
-        inputs.refuse_to_overwrite(
-            report, [*files, *([] if truth.truth is None else [Path(truth.truth)])]
-        )
-    known = inputs.open_truth(truth, reading)
-    source = inputs.open_source(
-        files,
-        reading,
-        repairing,
-        quiet=quiet,
-    )
+        inputs.refuse_to_overwrite(report, [*files, truth.truth])
+    opened = inputs.open_recording(files, truth, reading, repairing, quiet=quiet)
     with output.progress("evaluating", quiet) as callback:
         result = evaluate(
-            source,
-            truth=known,
+            opened.source,
+            truth=opened.truth,
             alert_limits_m=limits,
             time_to_alert_s=time_to_alert,
             merge_s=merge,
@@ -96,7 +88,7 @@ def evaluate_files(
     if report is not None:
         from sbas.reporting import report as write_report  # drawing is loaded only where used
 
-        causes = likely_causes(source, result, truth=known, accept=accept or ())
+        causes = likely_causes(opened.source, result, truth=opened.truth, accept=accept or ())
         page = write_report(result, report, causes=causes)
     if json:
         output.print_json({**result.to_dict(), "report": None if page is None else str(page)})
@@ -125,7 +117,7 @@ def print_verdict(result: Evaluation) -> None:
     """The short answer: sizes of errors and levels, a row an alert limit, the findings."""
     print(result)
     if result.errors_are_lower_bound:
-        print("errors are a lower bound: they are formed against the recording's own median")
+        print(f"errors are {result.lower_bound_words}")
     table = Table(box=box.SIMPLE, pad_edge=False)
     heads = ("AL [m]", "available", "incl. gaps", "HMI epochs", "HMI events",
              f"HMI rate, upper {percent(result.settings.confidence)} [1/h]")  # fmt: skip
@@ -142,8 +134,33 @@ def print_verdict(result: Evaluation) -> None:
             "-" if rate is None else _upper(rate.demonstrated),
         )
     output.console().print(table)
+    if result.environments:
+        output.console().print(_by_environment(result))
+        print("an event across a border counts under each label\n")
     print(_processes(result))
     output.print_findings(result.findings)
+
+
+def _by_environment(result: Evaluation) -> Table:
+    """A row a label: sizes, availability and HMI at the smallest alert limit."""
+    table = Table(box=box.SIMPLE, pad_edge=False)
+    least = min(result.settings.alert_limits_m)
+    for head in ("environment", "hours", "HPE 95 % [m]", "HPL median [m]",
+                 f"incl. gaps, AL {least:g} m", "HMI events", "HMI rate, upper [1/h]"):  # fmt: skip
+        table.add_column(escape(head), justify="left" if head == "environment" else "right")
+    for name, part in result.environments.items():
+        at = part.at(least)
+        rate = at.rates.get("hmi")
+        table.add_row(
+            escape(name),
+            f"{part.hours:.4g}",
+            "-" if part.hpe_m is None else f"{part.hpe_m.p95:.2f}",
+            "-" if part.hpl_m is None else f"{part.hpl_m.median:.2f}",
+            share(at.availability.availability.value),
+            "-" if rate is None else str(rate.events),
+            "-" if rate is None else _upper(rate.demonstrated),
+        )
+    return table
 
 
 def _processes(result: Evaluation) -> str:
@@ -173,6 +190,10 @@ def rate(
     repairing: inputs.Repairing,
     alert_limit: Annotated[float, typer.Option(help="Horizontal alert limit in metres.")],
     confidence: Confidence = _DEFAULTS.confidence,
+    environment: Annotated[
+        str | None,
+        typer.Option(help="Only the epochs of this label; see --environments."),
+    ] = None,
     event: Annotated[
         str, typer.Option(help="; ".join(f"{k}: {v}" for k, v in EVENT_KINDS.items()))
     ] = "hmi",
@@ -193,20 +214,15 @@ def rate(
         raise InputError(
             f"unknown event {event!r}", cure=f"--event with one of {', '.join(EVENT_KINDS)}"
         )
-    known = inputs.open_truth(truth, reading)
-    source = inputs.open_source(
-        files,
-        reading,
-        repairing,
-        quiet=quiet,
-    )
+    opened = inputs.open_recording(files, truth, reading, repairing, quiet=quiet)
     with output.progress("evaluating", quiet) as callback:
         result = failure_rate(
-            source,
-            truth=known,
+            opened.source,
+            truth=opened.truth,
             alert_limit_m=alert_limit,
             confidence=confidence,
             event=event,
+            environment=environment,
             target_per_h=target_per_h,
             time_to_alert_s=time_to_alert,
             merge_s=merge,

@@ -57,17 +57,11 @@ def states(
     """
     from sbas.dependability import receiver_states
 
-    known = inputs.open_truth(truth, reading)
-    source = inputs.open_source(
-        files,
-        reading,
-        repairing,
-        quiet=quiet,
-    )
+    opened = inputs.open_recording(files, truth, reading, repairing, quiet=quiet)
     with output.progress("reading states", quiet) as callback:
         found = receiver_states(
-            source,
-            truth=known,
+            opened.source,
+            truth=opened.truth,
             threshold_m=threshold_m,
             boundary=boundary,
             confidence=confidence,

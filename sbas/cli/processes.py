@@ -35,16 +35,10 @@ def decorrelation(
 
     Example:  sbas decorrelation roof.sbf --truth 50.03,15.77,289.4
     """
-    known = inputs.open_truth(truth, reading)
-    source = inputs.open_source(
-        files,
-        reading,
-        repairing,
-        quiet=quiet,
-    )
+    opened = inputs.open_recording(files, truth, reading, repairing, quiet=quiet)
     result = decorrelation_of_source(
-        source,
-        truth=known,
+        opened.source,
+        truth=opened.truth,
         segments=_segments(segments),
         confidence=confidence,
         accept_findings=accept or (),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -15,7 +15,7 @@ from sbas.cli.evaluation import likely_causes, print_verdict
 from sbas.cli.option_groups import with_option_groups
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.input_check import CheckResult, check
+from sbas.input_check import CheckResult, check, fix
 from sbas.integrity.evaluation import evaluate
 from sbas.laboratory import (
     LaboratorySettings,
@@ -41,19 +41,27 @@ def check_files(
     truth: inputs.TruthGiven,
     reading: inputs.Reading,
     repairing: inputs.Repairing,
+    fix_out: Annotated[
+        Path | None,
+        typer.Option(
+            "--fix",
+            metavar="OUT.parquet",
+            help="Make every repair that is beyond doubt as well, and write the recording here; "
+            "its metadata list the repairs.",
+        ),
+    ] = None,
     json: output.Json = False,
     quiet: output.Quiet = False,
 ) -> None:
     """Can I trust this input? What is wrong with it, where, and the cure.
 
-    Example:  sbas check roof.sbf --json
+    Example:  sbas check roof.sbf --fix roof-repaired.parquet
     """
+    if fix_out is not None:
+        inputs.refuse_to_overwrite(fix_out, [*files, truth.truth])
     try:
-        source = inputs.open_source(
-            files,
-            reading,
-            repairing,
-            quiet=quiet,
+        opened = inputs.open_recording(
+            files, truth, reading, repairing, quiet=quiet, whole=fix_out is not None
         )
     except InputError as error:
         # What cannot be read is the plainest finding of all; programs get it as one.
@@ -63,12 +71,19 @@ def check_files(
             )
             output.print_json({"epochs": 0, "format": None, "findings": [finding.to_dict()]})
         raise
-    known = inputs.open_truth(truth, reading)
-    result = check(source, truth=known)
+    if fix_out is None:
+        result = check(opened.source, truth=opened.truth)
+    else:
+        assert isinstance(opened.source, Recording)
+        recording, result = fix(opened.source, truth=opened.truth)
+        _write(fix_out, [recording])
     if json:
-        output.print_json(result.to_dict())
+        written = {} if fix_out is None else {"file": str(fix_out)}
+        output.print_json({**result.to_dict(), **written})
     else:
         _print_check(result)
+        if fix_out is not None:
+            print(f"\nrepaired  {fix_out}")
     if not result.usable:
         raise typer.Exit(2)
 
@@ -119,16 +134,21 @@ def simulate(
               f"  sbas evaluate {out} --truth {truth}")  # fmt: skip
 
 
-def write_simulation(settings: LaboratorySettings, out: Path, *, quiet: bool) -> int:
-    """Write a simulated recording piece by piece; the number of epochs written."""
+def _write(out: Path, pieces: Iterable[Recording]) -> None:
+    """Write consecutive pieces of a recording in the format that the name asks for."""
     writers = {ext: f.write for f in formats() if f.write for ext in f.extensions}
     write = writers.get(out.suffix.lower())
     if write is None:
         raise InputError(
             f"cannot write {out.name!r}",
-            cure=f"give --out with one of {', '.join(sorted(writers))}",
+            cure=f"name a file that ends in one of {', '.join(sorted(writers))}",
         )
     out.parent.mkdir(parents=True, exist_ok=True)
+    write(pieces, out)
+
+
+def write_simulation(settings: LaboratorySettings, out: Path, *, quiet: bool) -> int:
+    """Write a simulated recording piece by piece; the number of epochs written."""
     epochs = 0
     with output.progress(f"simulating {out.name}", quiet) as callback:
 
@@ -140,7 +160,7 @@ def write_simulation(settings: LaboratorySettings, out: Path, *, quiet: bool) ->
                 if callback is not None:
                     callback(epochs, settings.epochs)
 
-        write(counted(), out)
+        _write(out, counted())
     return epochs
 
 

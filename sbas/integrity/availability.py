@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sbas.estimate import Counted, Estimate
 from sbas.integrity.counting import poisson_bounds
+from sbas.integrity.environments.record_part import RecordPart, shared
 from sbas.integrity.events import Runs
 from sbas.integrity.shares.block_bootstrap import share_estimate
 from sbas.integrity.shares.time_spans import Spans, spans_of_runs
@@ -21,6 +22,9 @@ NOT_INFERRED = (
     "describes this recording: epochs are correlated, and without a decorrelation time no "
     "interval follows from their number"
 )
+
+
+_NEVER_UP = "the service was lost on entry and never up here"
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,9 @@ class Availability:
     continuity_window_epochs: int
 
 
-def continuity_risk(first: Ints, stop: Ints, rows: int, window: int) -> float:
+def continuity_risk(
+    first: Ints, stop: Ints, rows: int, window: int, part: RecordPart | None = None
+) -> float:
     """Probability to lose the service within a window, given that it is up now.
 
     Parameters
@@ -57,6 +63,7 @@ def continuity_risk(first: Ints, stop: Ints, rows: int, window: int) -> float:
         equal for a gap, which has no rows.
     rows : epochs in all.
     window : W [epochs].
+    part : count epochs of this part only, wherever the service is lost; None counts all.
 
     Returns
     -------
@@ -65,9 +72,13 @@ def continuity_risk(first: Ints, stop: Ints, rows: int, window: int) -> float:
     (definition only), the wording of Navipedia, EGNOS Performances.
     """
     previous = np.concatenate([[0], stop[:-1]])
-    up_before = first - previous
-    up = rows - int(np.sum(stop - first))
-    return float(np.minimum(up_before, window).sum()) / up if up else 1.0
+    at_risk = np.minimum(first - previous, window)
+    if part is None:
+        up = rows - int(np.sum(stop - first))
+    else:
+        at_risk = part.rows_between(first - at_risk, first)
+        up = part.rows - int(np.sum(part.rows_between(first, stop)))
+    return float(at_risk.sum()) / up if up else 1.0
 
 
 def availability(
@@ -80,6 +91,7 @@ def availability(
     confidence: float,
     tau_s: float | None,
     window_epochs: int = 15,
+    part: RecordPart | None = None,
 ) -> Availability:
     """Availability figures from the runs of down epochs and the gaps of a record.
 
@@ -87,29 +99,37 @@ def availability(
     ----------
     down : runs of epochs without service (no fix, level missing, or level >= alert limit).
     gaps : gaps of the record.
-    up_ns, down_ns : time that up and down epochs cover [ns].
+    up_ns, down_ns : time that up and down epochs of the part cover [ns].
     interval_ns : sampling interval [ns].
     confidence : one-sided, for every bound.
     tau_s : upper limit of the decorrelation time [s]; None gives availability no bound.
     window_epochs : W of the continuity risk.
+    part : figures of this part of the record, such as one environment; None: of all of it.
 
     Notes
     -----
     A loss is a transition from up to down. Down at the record's start is no loss; down at its
-    end is no recovery. MTTF = up time / losses, MTTR = down time / recoveries; their bounds
+    end is no recovery. In a part a loss counts where the service is first down, a recovery where
+    it is last down, a gap with the epoch before it; coming from another part, or leaving for
+    one, is neither: over parts, losses and recoveries sum to those of the record.
+    MTTF = up time / losses, MTTR = down time / recoveries; their bounds
     take losses and recoveries as Poisson events (methods: integrity statistics, 4.3). Bounds of
     availability: `sbas.integrity.shares.block_bootstrap.share_estimate`.
     """
     hour_ns = 3600 * NS_PER_S
-    down_rows = int(np.sum(down.last - down.first + 1))
+    record = RecordPart.of_all(down, interval_ns)
+    here = record if part is None else part
+    up_rows = here.rows - int(here.rows_between(down.first, down.last + 1).sum())
     up_h = up_ns / hour_ns
-    gap_h = float(gaps.missing_ns(interval_ns).sum()) / hour_ns
+    # The row before a gap tells whose it is: no gap stands before the first row.
+    gap_h = float(gaps.missing_ns(interval_ns)[here.holds(gaps.row - 1)].sum()) / hour_ns
     down_h = down_ns / hour_ns
     first, stop = _fused(
         np.concatenate([down.first, gaps.row]), np.concatenate([down.last + 1, gaps.row])
     )
-    losses = int(np.sum(first > 0))
-    recoveries = int(np.sum(stop < down.rows))
+    lost_at = first - np.isin(first, gaps.row)
+    losses = int(np.sum(here.holds(lost_at)[first > 0]))
+    recoveries = int(np.sum(here.holds(stop - 1)[stop < down.rows]))
     loss_rate = poisson_bounds(losses, up_h, confidence) if up_h else None
     if losses and loss_rate:
         mttf = Estimate(
@@ -118,9 +138,10 @@ def availability(
         )  # fmt: skip
     else:
         bound = 1 / _upper(loss_rate) if loss_rate else 0.0
+        unseen = "no loss of service was seen: the value is the lower bound itself"
         mttf = Estimate(
-            bound, bound, None, confidence, "h", Counted(0, up_h, "losses of service"), "lower",
-            ("no loss of service was seen: the value is the lower bound itself",),
+            bound, bound, None, confidence, "h", Counted(losses, up_h, "losses of service"),
+            "lower", (_NEVER_UP if losses else unseen,),
         )  # fmt: skip
     mttr = None
     if recoveries:
@@ -132,8 +153,9 @@ def availability(
         )  # fmt: skip
     rows_first, rows_stop = _fused(down.first, down.last + 1)
     recorded = _recorded(down, gaps, interval_ns)
-    whole = Spans(recorded.start_ns[:1], recorded.end_ns[-1:])
     up = recorded.without(spans_of_runs(down, interval_ns=interval_ns))
+    if part is not None:
+        recorded, up = shared(recorded, part.spans), shared(up, part.spans)
 
     def fraction(hours: float, observed: Spans) -> Estimate:
         share = up_h / hours if hours else 0.0
@@ -144,11 +166,11 @@ def availability(
             )  # fmt: skip
             if isinstance(found, Estimate) and found.lower is not None:
                 return replace(found, value=share, lower=min(found.lower, share))
-        basis = Counted(down.rows - down_rows, hours, "available epochs")
+        basis = Counted(up_rows, hours, "available epochs")
         return Estimate(share, None, None, None, "1", basis, "lower", (NOT_INFERRED,))
 
     return Availability(
-        fraction(up_h + down_h + gap_h, whole),
+        fraction(up_h + down_h + gap_h, here.spans),
         fraction(up_h + down_h, recorded),
         up_h,
         down_h,
@@ -157,8 +179,8 @@ def availability(
         recoveries,
         mttf,
         mttr,
-        continuity_risk(first, stop, down.rows, window_epochs),
-        continuity_risk(rows_first, rows_stop, down.rows, window_epochs),
+        continuity_risk(first, stop, down.rows, window_epochs, part),
+        continuity_risk(rows_first, rows_stop, down.rows, window_epochs, part),
         window_epochs,
     )
 

@@ -67,7 +67,7 @@ def error_process(
     grid : signed errors with levels, or why there are none.
     k_of_mode : (m + 1,) K of each mode, NaN where unknown: its epochs are in no tail.
     confidence : of the rates that will rest on it; the interval of tau has at least 0.95.
-    lower_bound : True where errors were formed against the recording's own median.
+    lower_bound : True where the truth shows but a part of the errors (own median, track line).
     """
     low, high = _CONFIDENCES
     if isinstance(grid, Refusal):
@@ -77,7 +77,7 @@ def error_process(
     ratio, pooled = _sigma_ratios(grid, sigma)
     if lower_bound:
         tail: TailFit | Refusal = Refusal(
-            "not modelled: errors against the recording's own median are only a lower bound",
+            "not modelled: errors against this truth are only a lower bound",
             "--truth LAT,LON,HEIGHT of the antenna",
         )
     elif ratio is None:

@@ -3,36 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sbas.estimate import Refusal
+from sbas.exceptions import InputError
 from sbas.findings import Finding, refuse_on_errors
+from sbas.frames import decimal_year
 from sbas.input_check import CheckResult, accept, check
-from sbas.integrity.availability import availability
 from sbas.integrity.correlation.error_grid import ErrorGrid, GridFiller
+from sbas.integrity.environments.label_tallies import MOST_LABELS
+from sbas.integrity.environments.record_part import RecordPart
 from sbas.integrity.epoch_levels import MODE_K_H, k_of_modes
-from sbas.integrity.error_process import error_process
-from sbas.integrity.events import Events, find_events
-from sbas.integrity.modelled_rates import modelled_event_rate
-from sbas.integrity.rate_evidence import EVENT_KINDS, EventKind, RateEvidence, rate_evidence
-from sbas.integrity.results import (
-    AlertLimitResult,
-    Curves,
-    ErrorEllipse,
-    Evaluation,
-    EvaluationSettings,
-    ExposureHours,
-    Summary,
-)
-from sbas.integrity.stanford import REGIONS
-from sbas.integrity.tallies import CURVE_LIMITS_M, LEVEL_GRID_M, LIMIT_KINDS, RecordTally
+from sbas.integrity.error_process import ErrorProcess, error_process
+from sbas.integrity.part_figures import EvaluatedRecord
+from sbas.integrity.part_tally import PartTally
+from sbas.integrity.results import Evaluation, EvaluationSettings, Summary
+from sbas.integrity.tallies import RecordTally
 from sbas.logs.format import Progress
 from sbas.recording import MODES, EpochSource, RecordingMeta
-from sbas.timescales import NS_PER_S
-from sbas.truth import FixedPoint, Truth
+from sbas.truth import FixedPoint, Truth, frame_findings
 
 Floats = NDArray[np.float64]
 
@@ -58,7 +50,9 @@ def evaluate(
 
     Parameters
     ----------
-    source : a Recording, or a source of `sbas.scan` that streams.
+    source : a Recording, or a source of `sbas.scan` that streams. Where its epochs have
+        environment labels (`sbas.environment_labels.label_epochs`), every figure is given by
+        label as well.
     truth : where the antenna was. Without it a static recording is held against its own median
         position: errors are then a lower bound and demonstrated rates are refused in words; a
         moving one gives levels and availability only.
@@ -87,33 +81,119 @@ def evaluate(
         confidence,
         tuple(accept_findings),
     )
+    return evaluation_of(source, settings, truth=truth, progress=progress)
+
+
+def evaluation_of(
+    source: EpochSource,
+    settings: EvaluationSettings,
+    *,
+    truth: Truth | None,
+    labels: Collection[str] | None = None,
+    progress: Progress | None = None,
+) -> Evaluation:
+    """`evaluate` with the figures of some environments only, which is faster.
+
+    Parameters
+    ----------
+    source, truth, progress : as for `evaluate`.
+    settings : what is asked.
+    labels : environments to give figures of; None for all.
+
+    Raises
+    ------
+    InputError : as `evaluate`, or no epoch has one of the labels.
+    """
     checked = check(source, truth=truth)
-    findings = list(accept(checked.findings, settings.accept))
-    refuse_on_errors(findings)
     survey = checked.survey
+    year = float(decimal_year(np.datetime64(survey.begin_ns, "ns"))) if survey.epochs else None
+    found = (*checked.findings, *frame_findings(source.meta, truth, year=year))
+    findings = list(accept(found, settings.accept))
+    refuse_on_errors(findings)
     if truth is None:
         truth, remark = _own_median(checked)
         findings.append(remark)
-    elif not truth.frame:
-        findings.append(
-            Finding(
-                "E09",
-                "warning",
-                "the truth's reference frame is not stated: errors may be wrong by some 1 m",
-                evidence="ITRF and ETRS89 part by about 2.5 cm a year since 1989; the 1 m is in "
-                "truth_sigma_h_m, no error and no count is changed by it",
-                cure="--frame, such as --frame 'ITRF2014 2010.0'",
-            )
-        )
 
-    tally = RecordTally(survey, truth, settings.alert_limits_m)
+    labelled = "environment" in source.columns and (labels is None or len(labels) > 0)
+    tally = RecordTally(survey, truth, settings.alert_limits_m, labelled=labelled)
     done = 0
-    for batch in source.batches(RecordTally.COLUMNS):
+    for batch in source.batches(tally.columns):
         tally.update(batch)
         done += len(batch)
         if progress is not None:
             progress(done, survey.epochs)
-    return _evaluation(source.meta, settings, checked, findings, truth, tally)
+    return _evaluation(source.meta, settings, checked, findings, truth, tally, labels)
+
+
+def _evaluation(
+    meta: RecordingMeta,
+    settings: EvaluationSettings,
+    checked: CheckResult,
+    findings: list[Finding],
+    truth: Truth | None,
+    tally: RecordTally,
+    labels: Collection[str] | None,
+) -> Evaluation:
+    lower_bound = truth is not None and truth.lower_bound
+    findings += _remarks(settings, truth, tally.all)
+    grid: ErrorGrid | Refusal
+    if isinstance(tally.grid, GridFiller):
+        grid, remarks = tally.grid.result()
+        findings += remarks
+    else:
+        grid = tally.grid
+    k_of_mode, assumed = _k_of_mode(meta, tally.all)
+    findings += assumed
+
+    def process_of(errors: ErrorGrid | Refusal) -> ErrorProcess:
+        return error_process(
+            errors, k_of_mode=k_of_mode, confidence=settings.confidence, lower_bound=lower_bound
+        )
+
+    process = process_of(grid)
+    findings += process.decorrelation.findings
+    record = EvaluatedRecord(
+        meta=meta,
+        settings=settings,
+        input=checked,
+        truth=truth,
+        tally=tally,
+        merge_s=process.merge_s if settings.merge_s is None else settings.merge_s,
+        tau_known=not isinstance(process.decorrelation.tau_s, Refusal),
+    )
+    environments = {}
+    for label, (counts, part) in _parts(tally, labels).items():
+        own = process_of(grid if isinstance(grid, Refusal) else part.grid_of(grid))
+        remarks = (*_remarks(settings, truth, counts), *own.decorrelation.findings)
+        environments[label] = record.evaluation(counts, own, remarks, label=label, part=part)
+    if tally.labels is not None and tally.labels.too_many:
+        findings.append(
+            Finding(
+                "E25", "warning",
+                f"more than {MOST_LABELS} environment labels: no figures by environment",
+                evidence="the figures of the whole record are not touched",
+                cure="label with few words, such as open, urban, woody, cutting, tunnel",
+            )
+        )  # fmt: skip
+    return record.evaluation(tally.all, process, findings, environments=environments)
+
+
+def _parts(
+    tally: RecordTally, wanted: Collection[str] | None
+) -> dict[str, tuple[PartTally, RecordPart]]:
+    found = {} if tally.labels is None else tally.labels.parts(tally.interval_ns)
+    if wanted is None:
+        return found
+    known = f"labels are {', '.join(found)}" if found else "no epoch has a label"
+    if tally.labels is not None and tally.labels.too_many:
+        known = f"there are more than {MOST_LABELS} labels"
+    for label in wanted:
+        if label not in found:
+            raise InputError(
+                f"no figures for the environment {label!r}", evidence=known,
+                cure="name one of few labels, from segments or a column environment",
+            )  # fmt: skip
+    return {label: found[label] for label in wanted}
 
 
 def _own_median(checked: CheckResult) -> tuple[FixedPoint | None, Finding]:
@@ -138,7 +218,7 @@ def _own_median(checked: CheckResult) -> tuple[FixedPoint | None, Finding]:
     )  # fmt: skip
 
 
-def _k_of_mode(meta: RecordingMeta, tally: RecordTally) -> tuple[Floats, list[Finding]]:
+def _k_of_mode(meta: RecordingMeta, tally: PartTally) -> tuple[Floats, list[Finding]]:
     """K behind each mode's levels; where nothing states it, that of the non-precision approach."""
     names = (*MODES, "unknown")
     usual = max(range(len(names)), key=lambda i: tally.modes[names[i]])
@@ -163,11 +243,10 @@ def _k_of_mode(meta: RecordingMeta, tally: RecordTally) -> tuple[Floats, list[Fi
 def _remarks(
     settings: EvaluationSettings,
     truth: Truth | None,
-    tally: RecordTally,
-    hpe: Summary | None,
-    hpl: Summary | None,
+    tally: PartTally,
 ) -> list[Finding]:
     """What only the errors and levels themselves can show to be wrong with the input."""
+    hpe, hpl = Summary.of(tally.hpe), Summary.of(tally.hpl)
     found = []
     if tally.levels_left_out:
         found.append(
@@ -230,12 +309,13 @@ def _remarks(
             )
         )
     if truth is not None and not hpe:
+        covers = "the truth covers no epoch that has a position"
         found.append(
             Finding(
                 "E01",
                 "warning",
-                "the truth covers no epoch that has a position: no error was formed",
-                cure="check the times and the steps of the trajectory",
+                f"{covers if tally.positions else 'no epoch has a position'}: no error was formed",
+                cure="check the times and the steps of the trajectory" if tally.positions else "",
             )
         )
     if tally.truth_sigma_h_m > 0.1 * min(settings.alert_limits_m):
@@ -249,124 +329,3 @@ def _remarks(
             )
         )
     return found
-
-
-def _evaluation(
-    meta: RecordingMeta,
-    settings: EvaluationSettings,
-    checked: CheckResult,
-    findings: list[Finding],
-    truth: Truth | None,
-    tally: RecordTally,
-) -> Evaluation:
-    survey = checked.survey
-    interval_ns = survey.interval_ns
-    hour_ns = 3600 * NS_PER_S
-    exposure = ExposureHours(
-        recorded_hours=tally.covered_ns / hour_ns,
-        gap_hours=float(survey.gaps.missing_ns(interval_ns).sum()) / hour_ns,
-        without_error_hours=(tally.covered_ns - tally.error_ns) / hour_ns,
-        without_level_hours=(tally.covered_ns - tally.level_ns) / hour_ns,
-        judged_hours=tally.judged_ns / hour_ns,
-        error_hours=tally.error_ns / hour_ns,
-    )
-    hpe, hpl = Summary.of(tally.hpe), Summary.of(tally.hpl)
-    findings += _remarks(settings, truth, tally, hpe, hpl)
-    lower_bound = truth is not None and truth.lower_bound
-    grid: ErrorGrid | Refusal
-    if isinstance(tally.grid, GridFiller):
-        grid, remarks = tally.grid.result()
-        findings += remarks
-    else:
-        grid = tally.grid
-    k_of_mode, assumed = _k_of_mode(meta, tally)
-    findings += assumed
-    process = error_process(
-        grid, k_of_mode=k_of_mode, confidence=settings.confidence, lower_bound=lower_bound
-    )
-    findings += process.decorrelation.findings
-    levels = tally.levels.result()
-    merge_s = process.merge_s if settings.merge_s is None else settings.merge_s
-    unknown_tau = isinstance(process.decorrelation.tau_s, Refusal)
-    caveats: tuple[str, ...] = ()
-    if settings.merge_s is None and unknown_tau:
-        caveats = (f"the decorrelation time is not known: runs were merged over {merge_s:g} s",)
-
-    def counted(kind: EventKind, limit: float, merge_s: float) -> Events:
-        runs = tally.mi.whole() if kind == "mi" else tally.at_limit(kind, limit)
-        minimum = settings.time_to_alert_s if kind == "hmi" else 0.0
-        return find_events(runs, interval_ns=interval_ns, merge_s=merge_s, minimum_s=minimum)
-
-    def rate(kind: EventKind, limit: float) -> RateEvidence:
-        events = counted(kind, limit, merge_s)
-        return rate_evidence(
-            kind,
-            limit,
-            events=len(events),
-            runs=len(tally.mi.whole() if kind == "mi" else tally.at_limit(kind, limit)),
-            event_hours=float(events.duration_s.sum()) / 3600,
-            merge_hours=merge_s / 3600,
-            judged_hours=(exposure.error_hours if kind == "exceeds_al" else exposure.judged_hours),
-            confidence=settings.confidence,
-            lower_bound=lower_bound,
-            modelled=modelled_event_rate(
-                kind, limit, process=process, levels=levels, confidence=settings.confidence
-            ),
-            caveats=caveats,
-        )
-
-    limits = []
-    for al in settings.alert_limits_m:
-        up = availability(
-            tally.down[al].whole(),
-            survey.gaps,
-            up_ns=tally.covered_ns - tally.down_ns[al],
-            down_ns=tally.down_ns[al],
-            interval_ns=interval_ns,
-            confidence=settings.confidence,
-            tau_s=process.tau_upper_s,
-        )
-        if truth is None:
-            limits.append(AlertLimitResult(al, up, None, {}, {}))
-            continue
-        regions = dict(zip(REGIONS, tally.regions[al].tolist(), strict=True))
-        events = {kind: counted(kind, al, settings.reset_s) for kind in EVENT_KINDS}
-        rates = {kind: rate(kind, al) for kind in EVENT_KINDS}
-        limits.append(AlertLimitResult(al, up, regions, events, rates))
-
-    def along_curve(kind: EventKind) -> tuple[RateEvidence, ...]:
-        return () if truth is None else tuple(rate(kind, al) for al in CURVE_LIMITS_M)
-
-    curves = Curves(
-        level_grid_m=np.array(LEVEL_GRID_M),
-        available_fraction=tally.levels_below() / max(tally.epochs, 1),
-        rates={kind: along_curve(kind) for kind in LIMIT_KINDS},
-        ratio_grid=tally.RATIO_GRID,
-        ratio_exceeded_fraction=tally.ratio_exceeded(),
-        stanford_cell_m=tally.stanford_cell_m,
-        stanford_counts=tally.stanford,
-    )
-    return Evaluation(
-        meta=meta,
-        settings=settings,
-        input=checked,
-        findings=tuple(findings),
-        truth=truth,
-        epochs=tally.epochs,
-        hours=exposure.recorded_hours,
-        exposure=exposure,
-        hpe_m=hpe,
-        vpe_m=Summary.of(tally.vpe),
-        hpl_m=hpl,
-        vpl_m=Summary.of(tally.vpl),
-        truth_sigma_h_m=tally.truth_sigma_h_m if hpe else None,
-        ellipse=ErrorEllipse(*tally.moments()) if hpe else None,
-        modes=tally.modes,
-        mi_epochs=tally.mi_epochs if truth is not None else None,
-        alert_limits=tuple(limits),
-        curves=curves,
-        strips=tally.strips,
-        scatter=tally.scatter,
-        levels=levels,
-        process=process,
-    )

@@ -9,7 +9,7 @@ from typing import Any
 from sbas.estimate import Estimate, Refusal
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.integrity.evaluation import evaluate
+from sbas.integrity.evaluation import evaluation_of
 from sbas.integrity.rate_evidence import EVENT_KINDS, EventKind, RateEvidence
 from sbas.integrity.results import EvaluationSettings
 from sbas.integrity.sil import SilVerdict, TargetVerdict, meets, sil_verdict
@@ -20,13 +20,17 @@ from sbas.truth import Truth
 
 @dataclass(frozen=True)
 class FailureRate:
-    """A rate in its evidence classes, with the verdict that its upper bound allows."""
+    """A rate in its evidence classes, with the verdict that its upper bound allows.
+
+    `environment` is the label that it is restricted to; None for the whole recording.
+    """
 
     evidence: RateEvidence
     confidence: float
     sil: SilVerdict | Refusal
     target: TargetVerdict | Refusal | None
     findings: tuple[Finding, ...]
+    environment: str | None = None
 
     @property
     def demonstrated(self) -> bool:
@@ -41,6 +45,7 @@ class FailureRate:
             "confidence": self.confidence,
             "sil": self.sil.to_dict(),
             "target": None if self.target is None else self.target.to_dict(),
+            "environment": self.environment,
             "findings": [f.to_dict() for f in self.findings],
         }
 
@@ -53,6 +58,7 @@ def failure_rate(
     confidence: float = 0.95,
     event: EventKind = "hmi",
     target_per_h: float | None = None,
+    environment: str | None = None,
     time_to_alert_s: float = EvaluationSettings.time_to_alert_s,
     merge_s: float | None = EvaluationSettings.merge_s,
     accept_findings: Iterable[str] = (),
@@ -68,10 +74,12 @@ def failure_rate(
     event : "hmi" (HPE >= AL and HPL < AL for the time to alert), "mi" (HPE >= HPL) or
         "exceeds_al" (HPE >= AL whatever the HPL).
     target_per_h : rate to be demonstrated [1/h]; only the upper bound decides.
+    environment : count the epochs with this label only, see docs/methods/environments.md.
 
     Raises
     ------
-    InputError : the input check found an error, or a moving recording has no truth (E01).
+    InputError : the input check found an error, a moving recording has no truth (E01), or no
+        epoch has the label.
 
     References
     ----------
@@ -81,16 +89,16 @@ def failure_rate(
         raise InputError(
             f"unknown event {event!r}", cure=f"--event with one of {', '.join(EVENT_KINDS)}"
         )
-    evaluation = evaluate(
-        source,
-        truth=truth,
-        alert_limits_m=(alert_limit_m,),
-        time_to_alert_s=time_to_alert_s,
-        merge_s=merge_s,
-        confidence=confidence,
-        accept_findings=accept_findings,
-        progress=progress,
+    settings = EvaluationSettings(
+        (float(alert_limit_m),),
+        time_to_alert_s,
+        merge_s,
+        EvaluationSettings.reset_s,
+        confidence,
+        tuple(accept_findings),
     )
+    labels = () if environment is None else (environment,)
+    evaluation = evaluation_of(source, settings, truth=truth, labels=labels, progress=progress)
     if evaluation.truth is None:
         raise InputError(
             "no truth, and the recording's own median cannot serve: no error rate",
@@ -98,6 +106,10 @@ def failure_rate(
             evidence="; ".join(f.message for f in evaluation.findings if f.code == "E01"),
             cure="--truth LAT,LON,HEIGHT or --truth TRAJECTORY.csv",
         )
+    findings = evaluation.findings
+    if environment is not None:
+        evaluation = evaluation.environments[environment]
+        findings = (*findings, *evaluation.findings)
     evidence = evaluation.at(float(alert_limit_m)).rates[event]
     sil: SilVerdict | Refusal
     target: TargetVerdict | Refusal | None = None
@@ -108,4 +120,4 @@ def failure_rate(
         sil = sil_verdict(evidence.demonstrated)
         if target_per_h is not None:
             target = meets(evidence.demonstrated, target_per_h)
-    return FailureRate(evidence, confidence, sil, target, evaluation.findings)
+    return FailureRate(evidence, confidence, sil, target, findings, environment)

@@ -147,7 +147,7 @@ def _as_seen(
     ratio = evaluation.process.sigma_ratio
     if evaluation.errors_are_lower_bound:
         return Refusal(
-            "errors against the recording's own median are only a lower bound",
+            "errors against this truth are only a lower bound",
             "--truth LAT,LON,HEIGHT of the antenna",
         )
     if ratio is None:

@@ -27,7 +27,7 @@ NPA_CLAIM = Estimate(
 
 _NO_CLAIM = Refusal("no allocation covers errors regardless of the protection level")
 _LOWER_BOUND = Refusal(
-    "not demonstrated: errors against the recording's own median are only a lower bound",
+    "not demonstrated: errors against this truth are only a lower bound",
     "--truth LAT,LON,HEIGHT of the antenna",
 )
 _NO_EXPOSURE = Refusal(
@@ -96,7 +96,7 @@ def rate_evidence(
     judged_hours : time covered by epochs at which such an event could be seen [h].
     merge_hours : merge time of the events [h].
     confidence : of the one-sided upper bound.
-    lower_bound : True where errors were formed against the recording's own median.
+    lower_bound : True where the truth shows but a part of the errors (own median, track line).
     modelled : the rate by a fitted tail, or why there is none.
     caveats : sentences that must travel with the demonstrated rate.
     """

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,7 @@ from sbas.numerals import key
 from sbas.recording import RecordingMeta
 from sbas.streaming import DensityGrid, Distribution, ThinnedSeries
 from sbas.timescales import NS_PER_S
+from sbas.track import TrackLine
 from sbas.truth import Truth
 
 if TYPE_CHECKING:
@@ -162,7 +164,19 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """The answer of `evaluate`."""
+    """The answer of `evaluate`: of a record, and by environment where its epochs have labels.
+
+    Parameters
+    ----------
+    input : check of the whole record.
+    begin_ns, end_ns : GPS times of the first and the last epoch [ns].
+    merge_s : merge time of the events of rates [s]: as set, else from the decorrelation time of
+        the whole record, also in an environment.
+    label : the environment that the figures are of; empty for the whole record.
+    environments : the same figures by label, in order of first appearance, epochs without one
+        under "unlabelled"; empty where no epoch has a label. Epochs and hours of all sum to
+        those of the record; what happens at their borders: docs/methods/environments.md.
+    """
 
     meta: RecordingMeta
     settings: EvaluationSettings
@@ -170,6 +184,8 @@ class Evaluation:
     findings: tuple[Finding, ...]
     truth: Truth | None
     epochs: int
+    begin_ns: int
+    end_ns: int
     hours: float
     exposure: ExposureHours
     hpe_m: Summary | None
@@ -186,11 +202,9 @@ class Evaluation:
     scatter: DensityGrid
     levels: LevelCounts
     process: ErrorProcess
-
-    @property
-    def merge_s(self) -> float:
-        """Merge time of the events of rates [s]: as set, else from the decorrelation time."""
-        return self.process.merge_s if self.settings.merge_s is None else self.settings.merge_s
+    merge_s: float
+    label: str = ""
+    environments: Mapping[str, Evaluation] = field(default_factory=dict)
 
     @cached_property
     def railway(self) -> RailwayJudgement | Refusal:
@@ -203,6 +217,13 @@ class Evaluation:
     def errors_are_lower_bound(self) -> bool:
         return self.truth is not None and self.truth.lower_bound
 
+    @property
+    def lower_bound_words(self) -> str:
+        """Why the errors are too small, where they are."""
+        if isinstance(self.truth, TrackLine):
+            return "a lower bound: only their part across the track is seen"
+        return "a lower bound: formed against the recording's own median"
+
     def at(self, alert_limit_m: float) -> AlertLimitResult:
         """The result at one of the alert limits."""
         for result in self.alert_limits:
@@ -212,13 +233,12 @@ class Evaluation:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        survey = self.input.survey
         return {
             "epochs": self.epochs,
             "hours": self.hours,
-            "begin_gpst": _stamp(survey.begin_ns),
-            "end_gpst": _stamp(survey.end_ns),
-            "interval_s": survey.interval_ns / NS_PER_S,
+            "begin_gpst": _stamp(self.begin_ns),
+            "end_gpst": _stamp(self.end_ns),
+            "interval_s": self.input.survey.interval_ns / NS_PER_S,
             "truth": None if self.truth is None else self.truth.label,
             "errors_are_lower_bound": self.errors_are_lower_bound,
             "truth_sigma_h_m": self.truth_sigma_h_m,
@@ -234,6 +254,7 @@ class Evaluation:
             "alert_limits": {key(r.alert_limit_m): _limit_dict(r) for r in self.alert_limits},
             "findings": [f.to_dict() for f in self.findings],
             "sources": [dict(vars(s)) for s in self.meta.sources],
+            "environments": {name: e.to_dict() for name, e in self.environments.items()},
         }
 
     def summary(self) -> Any:

@@ -4,6 +4,7 @@ from sbas.plots.architectures_against_target import architecture_ladder
 from sbas.plots.autocorrelation_picture import decorrelation_curve
 from sbas.plots.availability_against_limit import availability_curve
 from sbas.plots.comparison_picture import pair_strips
+from sbas.plots.environments_picture import environment_rates, environment_sizes
 from sbas.plots.error_scatter import scatter
 from sbas.plots.fault_tree_picture import tree_picture
 from sbas.plots.importance_picture import importance_bars
@@ -21,6 +22,8 @@ __all__ = [
     "architecture_ladder",
     "availability_curve",
     "decorrelation_curve",
+    "environment_rates",
+    "environment_sizes",
     "importance_bars",
     "k_curve",
     "pair_strips",

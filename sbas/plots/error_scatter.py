@@ -59,7 +59,8 @@ def scatter(evaluation: Evaluation, *, ax: Axes | None = None) -> Axes:
         kept = slice(max(half - farthest, 0), half + farthest)
         side = min(farthest, half) * grid.cell
         count_image(ax, grid.counts[kept, kept], (-side, side, -side, side))
-        origin = "own median" if evaluation.errors_are_lower_bound else "truth"
+        partial = evaluation.truth is not None and evaluation.truth.lower_bound
+        origin = evaluation.truth.label if partial and evaluation.truth else "truth"
         ax.axhline(0, color=BLACK, linewidth=0.5, zorder=3)
         ax.axvline(0, color=BLACK, linewidth=0.5, zorder=3)
         ax.plot([0], [0], "+", color=BLACK, markersize=9, label=origin, zorder=4)

@@ -15,6 +15,7 @@ from sbas.numerals import count, hours, stamp
 from sbas.reporting.content import Section
 from sbas.reporting.sections import (
     decorrelation_and_k,
+    environments,
     error_tail,
     event_list,
     exposure_hours,
@@ -77,9 +78,14 @@ def report_of(evaluation: Evaluation, *, causes: Causes | Refusal = NOT_EXPLAINE
         f"{stamp(survey.begin_ns)} to {stamp(survey.end_ns)} GPST"
     )
     sections = [section(evaluation) for section in _SECTIONS]
-    after_events = 1 + next(i for i, s in enumerate(sections) if s.key == "events")
-    sections.insert(after_events, likely_causes.section(causes))
+    sections.insert(_after("events", sections), likely_causes.section(causes))
+    if evaluation.environments:
+        sections.insert(_after("figures", sections), environments.section(evaluation))
     return Report(title, subtitle, tuple(sections))
+
+
+def _after(key: str, sections: list[Section]) -> int:
+    return 1 + next(i for i, section in enumerate(sections) if section.key == key)
 
 
 def render_html(document: Report) -> str:

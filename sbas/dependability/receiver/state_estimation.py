@@ -16,12 +16,13 @@ from sbas.dependability.receiver.state_tally import CODES, STATES, StateTally
 from sbas.estimate import Refusal
 from sbas.exceptions import InputError
 from sbas.findings import Finding, refuse_on_errors
+from sbas.frames import decimal_year
 from sbas.input_check import accept, check
 from sbas.logs.format import Progress
 from sbas.numerals import number, percent
 from sbas.recording import EpochSource
 from sbas.timescales import NS_PER_S
-from sbas.truth import Truth
+from sbas.truth import Truth, frame_findings
 
 Boundary = Literal["drop", "destination"]
 
@@ -269,14 +270,16 @@ def receiver_states(
         raise InputError(
             "no truth: the receiver's states are not given",
             code="E01",
-            evidence="errors against the recording's own median are a lower bound: wrong "
-            "positions would count as correct",
+            evidence="against the recording's own median, or a track line, errors are a lower "
+            "bound: wrong positions would count as correct",
             cure="--truth LAT,LON,HEIGHT or --truth TRAJECTORY.csv",
         )
     checked = check(source, truth=truth)
-    findings = list(accept(checked.findings, accept_findings))
-    refuse_on_errors(findings)
     survey = checked.survey
+    year = float(decimal_year(np.datetime64(survey.begin_ns, "ns"))) if survey.epochs else None
+    found = (*checked.findings, *frame_findings(source.meta, truth, year=year))
+    findings = list(accept(found, accept_findings))
+    refuse_on_errors(findings)
     tally = StateTally(
         truth, threshold_m, survey.interval_ns, destination=boundary == "destination"
     )
@@ -294,7 +297,7 @@ def receiver_states(
             evidence=", ".join(f"{n} {name}" for name, n in zip(CODES, total, strict=True) if n),
             cure="check the times and the steps of the truth",
         )  # fmt: skip
-    findings += _remarks(tally, truth, "hardware_fault" in source.columns)
+    findings += _remarks(tally, "hardware_fault" in source.columns)
 
     def chain(label: str, rows: list[int]) -> StateChain:
         def of(lengths: Any, state: int) -> tuple[tuple[int, int], ...]:
@@ -356,14 +359,8 @@ def _is_real(value: Any) -> bool:
     return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
-def _remarks(tally: StateTally, truth: Truth, with_flags: bool) -> Iterable[Finding]:
+def _remarks(tally: StateTally, with_flags: bool) -> Iterable[Finding]:
     """What the states themselves show to be doubtful in the input."""
-    if not truth.frame:
-        yield Finding(
-            "E09", "warning",
-            "the truth's reference frame is not stated: errors may be wrong by some 1 m",
-            cure="--frame, such as --frame 'ITRF2014 2010.0'",
-        )  # fmt: skip
     if tally.truth_sigma_h_m > 0.1 * tally.threshold_m:
         yield Finding(
             "E09", "warning",

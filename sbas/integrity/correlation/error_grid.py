@@ -16,7 +16,7 @@ from sbas.integrity.position_error import position_errors
 from sbas.recording import EpochSource
 from sbas.recording_survey import Survey
 from sbas.timescales import NS_PER_S
-from sbas.truth import Trajectory, Truth
+from sbas.truth import FixedPoint, Truth
 
 IN_MEMORY_BYTES = 1 << 29
 """Larger arrays lie in a temporary file, so that memory stays bounded."""
@@ -181,7 +181,7 @@ def error_grid(
     cells = grid_cells(facts)
     if isinstance(cells, Refusal):
         return cells, ()
-    moving = isinstance(truth, Trajectory)
+    moving = truth is not None and not isinstance(truth, FixedPoint)
     position = ("lat_deg", "lon_deg", "height_m") if moving else ("lat_deg", "lon_deg")
     columns = (*position, "environment") if labelled else position
     filler = GridFiller(facts, cells, labelled=labelled)

@@ -6,6 +6,7 @@ from sbas.integrity.results import Evaluation
 from sbas.numerals import count, metres, number
 from sbas.reporting.content import Cell, Section, table
 from sbas.timescales import NS_PER_S
+from sbas.truth import FixedPoint
 
 UNSTATED = "not stated"
 
@@ -35,7 +36,7 @@ def section(evaluation: Evaluation) -> Section:
                               f"risk {_or(level.risk)} {level.risk_per}".strip()),
         ("truth", "none" if truth is None else truth.label),
     ]  # fmt: skip
-    if truth is not None and not truth.lower_bound:
+    if truth is not None and not (isinstance(truth, FixedPoint) and truth.lower_bound):
         sigma = evaluation.truth_sigma_h_m
         rows += [
             ("frame of the truth", truth.frame or f"{UNSTATED}; 1 m is allowed for it"),

@@ -22,7 +22,7 @@ METHODS = (
            "RTCA DO-229D, 1.7.2; local tangent plane at the truth (WGS 84 ellipsoid)"),
     Method("levels", "HPL, VPL: min, median, 95 %, max", "sbas.streaming.Distribution.quantile",
            "levels as reported by the receiver; order statistics, linear between them"),
-    Method("ellipse", "error ellipse", "sbas.integrity.evaluation.ErrorEllipse.axes",
+    Method("ellipse", "error ellipse", "sbas.integrity.results.ErrorEllipse.axes",
            "eigenvalues of the covariance of the horizontal error; 95 %: K = sqrt(-2 ln 0.05)"),
     Method("sigma", "sigma_H (d_major)", "sbas.recording.major_semi_axis_m",
            "RTCA DO-229D, J.1: major semi-axis of the error ellipse"),

@@ -60,7 +60,7 @@ def _quantities(evaluation: Evaluation) -> Table:
             "(1-sigma, horizontal): no error is known better."
         )
     if evaluation.errors_are_lower_bound:
-        notes.append("HPE and VPE are a lower bound: formed against the recording's own median.")
+        notes.append(f"HPE and VPE are {evaluation.lower_bound_words}.")
     if evaluation.ellipse is not None:
         e = evaluation.ellipse
         major, minor, azimuth = e.axes()

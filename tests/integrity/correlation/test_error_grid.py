@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from sbas.estimate import Refusal
-from sbas.input_check import survey
+from sbas.recording_survey import survey
 from sbas.integrity.correlation import error_grid as module
 from sbas.integrity.correlation.error_grid import ErrorGrid, error_grid, room
 from sbas.integrity.position_error import position_errors
