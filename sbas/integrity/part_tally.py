@@ -105,7 +105,10 @@ class PartTally:
         self._ratio_counts = np.zeros(self.RATIO_GRID.size + 1, np.int64)
         self._sums = np.zeros(5)
         self.levels = LevelCounter(int(GAP_STEPS * survey.interval_ns))
-        self.strips = ThinnedSeries(survey.begin_ns, survey.end_ns, STRIPS, STRIP_BINS)
+        # Not more bins than epochs: empty ones would break the lines of a short record.
+        span_ns = survey.end_ns - survey.begin_ns
+        bins = min(STRIP_BINS, span_ns // max(survey.interval_ns, 1) + 1)
+        self.strips = ThinnedSeries(survey.begin_ns, survey.end_ns, STRIPS, bins)
         self.scatter = DensityGrid()
         self.stanford_cell_m = 1.2 * max(alert_limits_m) / STANFORD_BINS
         self.stanford = np.zeros((STANFORD_BINS, STANFORD_BINS), np.int64)

@@ -346,7 +346,9 @@ def _strips(
 ) -> ThinnedSeries:
     """What the picture shows, over the shared span."""
     span = int(common.time_ns[0]), int(common.time_ns[-1])
-    series = ThinnedSeries(*span, STRIPS, STRIP_BINS)
+    # Not more bins than epochs: empty ones would break the lines of a short record.
+    bins = min(STRIP_BINS, common.time_ns.size)
+    series = ThinnedSeries(*span, STRIPS, bins)
     for name, table in (("a", a), ("b", b)):
         part = table.iloc[slice(*_span_rows(_time_ns(table), common))]
         n_sv = part["n_sv"].to_numpy().astype(float)

@@ -149,13 +149,15 @@ def _caveats(result: Comparison) -> Iterator[str]:
     else:
         yield f"intervals rest on tau = {result.settings.tau_s:g} s as given"
     ratio = result.hpl_ratio
-    if isinstance(ratio, LevelRatio) and isinstance(ratio.expected, float) and ratio.expected != 1:
+    expected = ratio.expected if isinstance(ratio, LevelRatio) else None
+    other_k = isinstance(expected, float) and expected != 1
+    if other_k:
         yield (
             "the K factors differ: the levels of the two modes do not bound the same risk (PA: "
             "one dimension, 150 s; NPA: two dimensions, 1 h)"
         )
     found = result.difference
-    if not isinstance(found, Refusal) and found.max == 0:
+    if not isinstance(found, Refusal) and found.max == 0 and not other_k:
         yield "the positions are the same at every epoch: is it one recording given twice?"
     lost = result.unpaired_a - result.between_a, result.unpaired_b - result.between_b
     for label, missing in ((result.label_b, lost[0]), (result.label_a, lost[1])):
