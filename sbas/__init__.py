@@ -23,6 +23,7 @@ from sbas.truth import FixedPoint, Trajectory, transformed
 from sbas.version import __version__
 
 if TYPE_CHECKING:
+    from sbas.augmentation import read_messages
     from sbas.dependability import depend, load_models, receiver_states
     from sbas.integrity import (
         compare,
@@ -39,7 +40,9 @@ if TYPE_CHECKING:
         railway_hpl,
     )
     from sbas.laboratory import simulate
+    from sbas.positioning import levels_from_satellites, protect, stanford_esa
     from sbas.reporting import report
+    from sbas.rinex import read_navigation, read_observations
 
 __all__ = [
     "EnvironmentSegments",
@@ -68,20 +71,26 @@ __all__ = [
     "k_models",
     "k_verdict",
     "label_epochs",
+    "levels_from_satellites",
     "load_allocation",
     "load_models",
     "load_segments",
     "load_track",
     "plan_hours",
     "position_errors",
+    "protect",
     "railway_hpl",
     "read",
+    "read_messages",
+    "read_navigation",
+    "read_observations",
     "read_truth_table",
     "receiver_states",
     "repair",
     "report",
     "scan",
     "simulate",
+    "stanford_esa",
     "transformed",
 ]
 
@@ -95,6 +104,9 @@ _LATER = {
         "sbas.integrity",
     ),
     **dict.fromkeys(("depend", "load_models", "receiver_states"), "sbas.dependability"),
+    "read_messages": "sbas.augmentation",
+    **dict.fromkeys(("levels_from_satellites", "protect", "stanford_esa"), "sbas.positioning"),
+    **dict.fromkeys(("read_navigation", "read_observations"), "sbas.rinex"),
     "simulate": "sbas.laboratory",
     "report": "sbas.reporting",
 }  # fmt: skip

@@ -2,19 +2,55 @@
 
 from __future__ import annotations
 
+import difflib
+import importlib
 import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 import sbas
-from sbas.cli import comparing, evaluation, localisation, planning, processes, recordings
 from sbas.exceptions import SbasError
 
+VERBS = {
+    **dict.fromkeys(("demo", "simulate", "check"), "recordings"),
+    **dict.fromkeys(("evaluate", "rate"), "evaluation"),
+    "decorrelation": "processes",
+    "compare": "comparing",
+    **dict.fromkeys(("kfactor", "plan"), "planning"),
+    "protect": "ranges",
+    **dict.fromkeys(("states", "depend"), "localisation"),
+}
+"""Verbs by the module that has them: a verb loads what it needs, not what all need."""
+
+
+class _Verbs(TyperGroup):
+    """The verbs, each loaded when it is asked for."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name not in VERBS:
+            return None
+        module = importlib.import_module(f"sbas.cli.{VERBS[cmd_name]}")
+        verbs = typer.Typer()
+        module.register(verbs)
+        return typer.main.get_group(verbs).commands[cmd_name]
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        near = difflib.get_close_matches(args[0], VERBS, n=1) if args else []
+        if near and args[0] not in VERBS:
+            ctx.fail(f"No such command {args[0]!r}. Did you mean {near[0]!r}?")
+        return super().resolve_command(ctx, args)
+
+
 app = typer.Typer(
+    cls=_Verbs,
     name="sbas",
     help="SBAS/EGNOS protection levels and integrity risk for railway signalling: from a "
     "receiver recording to a failure rate that a safety case can carry.",
@@ -25,8 +61,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (recordings, evaluation, processes, comparing, planning, localisation):
-    module.register(app)
 
 
 def _version(wanted: bool) -> None:

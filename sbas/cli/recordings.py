@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
 from sbas.cli import inputs, output
-from sbas.cli.evaluation import likely_causes, print_verdict
 from sbas.cli.option_groups import with_option_groups
+from sbas.cli.writing import write_recording
 from sbas.exceptions import InputError
 from sbas.findings import Finding
 from sbas.input_check import CheckResult, check, fix
-from sbas.integrity.evaluation import evaluate
-from sbas.laboratory import (
-    LaboratorySettings,
-    bundled_settings,
-    load_settings,
-    simulate_pieces,
-)
-from sbas.logs.registry import formats, read
+from sbas.logs.registry import read
 from sbas.recording import Recording
 from sbas.timescales import NS_PER_S
 from sbas.truth import FixedPoint
+
+if TYPE_CHECKING:
+    from sbas.laboratory import LaboratorySettings
 
 
 def register(app: typer.Typer) -> None:
@@ -59,6 +55,11 @@ def check_files(
     """
     if fix_out is not None:
         inputs.refuse_to_overwrite(fix_out, [*files, truth.truth])
+        if fix_out.suffix.lower() != ".parquet":
+            raise InputError(
+                f"--fix {fix_out.name} would lose the list of repairs",
+                cure="name a .parquet file: only it keeps metadata",
+            )
     try:
         opened = inputs.open_recording(
             files, truth, reading, repairing, quiet=quiet, whole=fix_out is not None
@@ -76,7 +77,7 @@ def check_files(
     else:
         assert isinstance(opened.source, Recording)
         recording, result = fix(opened.source, truth=opened.truth)
-        _write(fix_out, [recording])
+        write_recording(fix_out, [recording])
     if json:
         written = {} if fix_out is None else {"file": str(fix_out)}
         output.print_json({**result.to_dict(), **written})
@@ -118,6 +119,8 @@ def simulate(
 
     Example:  sbas simulate --hours 24 --seed 7 --out lab.sbf
     """
+    from sbas.laboratory import bundled_settings, load_settings
+
     chosen = bundled_settings() if settings is None else load_settings(settings)
     if hours is not None:
         chosen = replace(chosen, hours=hours)
@@ -134,21 +137,10 @@ def simulate(
               f"  sbas evaluate {out} --truth {truth}")  # fmt: skip
 
 
-def _write(out: Path, pieces: Iterable[Recording]) -> None:
-    """Write consecutive pieces of a recording in the format that the name asks for."""
-    writers = {ext: f.write for f in formats() if f.write for ext in f.extensions}
-    write = writers.get(out.suffix.lower())
-    if write is None:
-        raise InputError(
-            f"cannot write {out.name!r}",
-            cure=f"name a file that ends in one of {', '.join(sorted(writers))}",
-        )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    write(pieces, out)
-
-
 def write_simulation(settings: LaboratorySettings, out: Path, *, quiet: bool) -> int:
     """Write a simulated recording piece by piece; the number of epochs written."""
+    from sbas.laboratory import simulate_pieces
+
     epochs = 0
     with output.progress(f"simulating {out.name}", quiet) as callback:
 
@@ -160,7 +152,7 @@ def write_simulation(settings: LaboratorySettings, out: Path, *, quiet: bool) ->
                 if callback is not None:
                     callback(epochs, settings.epochs)
 
-        _write(out, counted())
+        write_recording(out, counted())
     return epochs
 
 
@@ -175,7 +167,11 @@ def demo(
 
     Example:  sbas demo --out demo
     """
-    from sbas.reporting import report  # drawing is loaded only where it is used
+    # Analyses and drawing are loaded only where they are used.
+    from sbas.cli.evaluation import likely_causes, print_verdict
+    from sbas.integrity.evaluation import evaluate
+    from sbas.laboratory import bundled_settings
+    from sbas.reporting import report
 
     settings = bundled_settings()
     recording = out / "laboratory_2009.sbf"
