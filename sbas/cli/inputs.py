@@ -67,6 +67,16 @@ class TruthGiven:
             help="Take the truth to another frame by name, such as 'ETRF2000>ITRF2014@2025.5'.",
         ),
     ] = None
+    truth_time_scale: Annotated[
+        str | None,
+        _truth(help="Time scale of a truth file that does not say it; else --time-scale."),
+    ] = None
+    truth_geoid: Annotated[
+        float | None,
+        _truth(
+            help="Geoid undulation for a truth or track with heights above the geoid; else --geoid."
+        ),
+    ] = None
     antenna_height: Annotated[float, _truth(help="Antenna above the truth's mark, in metres.")] = (
         0.0
     )
@@ -152,9 +162,9 @@ class Repairing:
     swap_latlon: Annotated[
         bool, _repair("--swap-latlon", help="Exchange latitude and longitude.")
     ] = False
-    sign: Annotated[str | None, _repair(metavar="lat|lon", help="Change the sign of this one.")] = (
-        None
-    )
+    sign: Annotated[
+        str | None, _repair(metavar="lat|lon|both", help="Change the sign of this one.")
+    ] = None
     height_offset: Annotated[
         float | None,
         _repair(help="Add to every height: a geoid undulation, an antenna height, in metres."),
@@ -220,10 +230,7 @@ def open_recording(
     known = open_truth(truth, reading, track)
     source = _open_source(files, reading, repairing, quiet=quiet, whole=whole)
     if truth.environments is not None:
-        segments = load_segments(
-            truth.environments,
-            time_scale=reading.time_scale or "GPST",  # type: ignore[arg-type]
-        )
+        segments = load_segments(truth.environments)
         source = label_epochs(source, segments, track=track, truth=known)
     return Opened(source, known, track)
 
@@ -278,7 +285,7 @@ def open_track(given: TruthGiven, reading: Reading) -> Track | None:
         given.track,
         track_id=given.track_id,
         height=given.track_height,  # type: ignore[arg-type]
-        geoid=reading.geoid,
+        geoid=reading.geoid if given.truth_geoid is None else given.truth_geoid,
         sigma_m=given.track_sigma,
         frame=given.frame or None if given.truth in (None, "track") else None,
     )
@@ -309,8 +316,8 @@ def open_truth(given: TruthGiven, reading: Reading, track: Track | None) -> Trut
             )
         table = read_truth_table(
             path,
-            time_scale=reading.time_scale,  # type: ignore[arg-type]
-            geoid=reading.geoid,
+            time_scale=given.truth_time_scale or reading.time_scale,  # type: ignore[arg-type]
+            geoid=reading.geoid if given.truth_geoid is None else given.truth_geoid,
             frame=given.frame,
         )
         found = Trajectory(table, given.antenna_height, given.truth_max_step, frame=given.frame)

@@ -15,7 +15,7 @@ from sbas.cli.option_groups import with_option_groups
 from sbas.cli.writing import write_recording
 from sbas.exceptions import InputError
 from sbas.findings import Finding
-from sbas.input_check import CheckResult, check, fix
+from sbas.input_check import CheckResult, accept, check, fix
 from sbas.logs.registry import read
 from sbas.recording import Recording
 from sbas.timescales import NS_PER_S
@@ -46,6 +46,7 @@ def check_files(
             "its metadata list the repairs.",
         ),
     ] = None,
+    accepted: inputs.Accept = None,
     json: output.Json = False,
     quiet: output.Quiet = False,
 ) -> None:
@@ -72,19 +73,22 @@ def check_files(
             )
             output.print_json({"epochs": 0, "format": None, "findings": [finding.to_dict()]})
         raise
+    made = False
     if fix_out is None:
         result = check(opened.source, truth=opened.truth)
     else:
         assert isinstance(opened.source, Recording)
         recording, result = fix(opened.source, truth=opened.truth)
         write_recording(fix_out, [recording])
+        made = recording.meta.options.get("repairs") != opened.source.meta.options.get("repairs")
+    result = replace(result, findings=accept(result.findings, accepted or ()))
     if json:
         written = {} if fix_out is None else {"file": str(fix_out)}
         output.print_json({**result.to_dict(), **written})
     else:
         _print_check(result)
         if fix_out is not None:
-            print(f"\nrepaired  {fix_out}")
+            print(f"\n{'repaired ' if made else 'nothing repaired; a copy is'} {fix_out}")
     if not result.usable:
         raise typer.Exit(2)
 
