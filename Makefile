@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 TESTS  ?= tests
 
-.PHONY: setup demo test check format bench notebooks lock clean
+.PHONY: setup demo test thorough check format bench notebooks lock clean
 .DEFAULT_GOAL := demo
 
 setup: $(READY)
@@ -23,6 +23,9 @@ demo: setup          ## simulate the bundled 3.5-day laboratory recording and wr
 
 test: setup          ## the everyday suite, a few minutes
 	$(BIN)/python -m pytest -n auto $(TESTS)
+
+thorough: setup      ## the suite with ten times as many random examples, new ones each time
+	SBAS_TEST_PROFILE=thorough $(BIN)/python -m pytest -n auto $(TESTS)
 
 check: setup         ## format, style, types
 	$(BIN)/ruff format --check .

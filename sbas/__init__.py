@@ -40,7 +40,8 @@ if TYPE_CHECKING:
         railway_hpl,
     )
     from sbas.laboratory import simulate
-    from sbas.positioning import levels_from_satellites, protect, stanford_esa
+    from sbas.monitoring import raim, raim_against_sbas, with_raim_flags
+    from sbas.positioning import levels_from_satellites, protect, stanford_esa, unaugmented
     from sbas.reporting import report
     from sbas.rinex import read_navigation, read_observations
 
@@ -80,6 +81,8 @@ __all__ = [
     "position_errors",
     "protect",
     "railway_hpl",
+    "raim",
+    "raim_against_sbas",
     "read",
     "read_messages",
     "read_navigation",
@@ -92,6 +95,8 @@ __all__ = [
     "simulate",
     "stanford_esa",
     "transformed",
+    "unaugmented",
+    "with_raim_flags",
 ]
 
 _LATER = {
@@ -105,8 +110,11 @@ _LATER = {
     ),
     **dict.fromkeys(("depend", "load_models", "receiver_states"), "sbas.dependability"),
     "read_messages": "sbas.augmentation",
-    **dict.fromkeys(("levels_from_satellites", "protect", "stanford_esa"), "sbas.positioning"),
+    **dict.fromkeys(
+        ("levels_from_satellites", "protect", "stanford_esa", "unaugmented"), "sbas.positioning"
+    ),
     **dict.fromkeys(("read_navigation", "read_observations"), "sbas.rinex"),
+    **dict.fromkeys(("raim", "raim_against_sbas", "with_raim_flags"), "sbas.monitoring"),
     "simulate": "sbas.laboratory",
     "report": "sbas.reporting",
 }  # fmt: skip

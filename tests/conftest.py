@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-settings.register_profile("sbas", deadline=None, max_examples=60, derandomize=True)
-settings.load_profile("sbas")
+settings.register_profile("everyday", deadline=None, max_examples=25, derandomize=True)
+settings.register_profile("thorough", deadline=None, max_examples=250)
+settings.load_profile(os.environ.get("SBAS_TEST_PROFILE", "everyday"))
 
 ROOT = Path(__file__).resolve().parent.parent
 

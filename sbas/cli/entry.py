@@ -22,7 +22,7 @@ VERBS = {
     "decorrelation": "processes",
     "compare": "comparing",
     **dict.fromkeys(("kfactor", "plan"), "planning"),
-    "protect": "ranges",
+    **dict.fromkeys(("protect", "raim"), "ranges"),
     **dict.fromkeys(("states", "depend"), "localisation"),
 }
 """Verbs by the module that has them: a verb loads what it needs, not what all need."""

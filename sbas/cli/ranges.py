@@ -1,4 +1,4 @@
-"""Verbs on ranges: protect."""
+"""Verbs on ranges: protect and raim."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ NavigationFiles = Annotated[
 
 def register(app: typer.Typer) -> None:
     app.command("protect")(protect_files)
+    app.command("raim")(raim_files)
 
 
 def protect_files(
@@ -139,6 +140,70 @@ def protect_files(
         print(f"\nrecording  {out}")
     if not fixes:
         raise typer.Exit(2)
+
+
+def raim_files(
+    obs: Observations,
+    nav: NavigationFiles,
+    messages: Annotated[
+        list[Path] | None,
+        typer.Option(help="SBAS messages; without them ranges are not corrected."),
+    ] = None,
+    geo: Annotated[int | None, typer.Option(help="PRN of the SBAS satellite.")] = None,
+    mode: Annotated[
+        Literal["pa", "npa"], typer.Option(help="With messages: which approach.")
+    ] = "npa",
+    position: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Known antenna position, earth-fixed, in metres."),
+    ] = None,
+    false_alarm: Annotated[float, typer.Option(help="Of the overall test, per epoch.")] = 1e-3,
+    missed_detection: Annotated[float, typer.Option(help="Of a fault of the stated size.")] = 1e-4,
+    elevation: Annotated[float, typer.Option(help="Elevation mask in degrees.")] = 5.0,
+    track_azimuth: Annotated[
+        float | None, typer.Option(help="Azimuth of a track: levels along and across it.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the recording with its RAIM flags: .parquet.")
+    ] = None,
+    json: output.Json = False,
+    quiet: output.Quiet = False,
+) -> None:
+    """What does RAIM say on the same epochs: available, detected, excluded, HERL?
+
+    Example:  sbas raim --obs a.obs --nav a.nav --messages a.ems --geo 123
+    """
+    from sbas.monitoring import raim, with_raim_flags  # loaded only where it is used
+    from sbas.positioning import protect, unaugmented
+
+    inputs = [*obs, *nav, *(messages or ())]
+    if out is not None:
+        refuse_to_overwrite(out, inputs)
+    with output.progress("positioning", quiet) as callback:
+        if callback is not None:
+            callback(0, 1)
+        place = _place(position)
+        if messages:
+            if geo is None:
+                raise InputError("--messages need the SBAS satellite", cure="--geo PRN")
+            recording = protect(
+                obs, nav, messages, geo=geo, mode=mode, place_m=place, elevation_mask_deg=elevation
+            )
+        else:
+            recording = unaugmented(obs, nav, place_m=place, elevation_mask_deg=elevation)
+        result = raim(
+            recording,
+            false_alarm=false_alarm,
+            missed_detection=missed_detection,
+            track_azimuth_deg=track_azimuth,
+        )
+    if out is not None:
+        write_recording(out, [with_raim_flags(recording, result)])
+    if json:
+        output.print_json({**result.to_dict(), "file": None if out is None else str(out)})
+    else:
+        print(result)
+        output.print_findings(result.findings)
 
 
 def _place(text: str | None) -> tuple[float, float, float] | None:

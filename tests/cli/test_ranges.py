@@ -59,6 +59,20 @@ def test_bad_input(
     assert "overwrite" in over.err
 
 
+def test_raim_of_the_same_epochs(
+    arguments: tuple[object, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "raim.parquet"
+    corrected = Answer(capsys, "raim", *arguments, "--out", out, "--json").json
+    assert corrected["epochs"] == 312
+    assert 0 < corrected["available"] <= 310
+    assert corrected["herl_m"]["median"] > 10
+    assert pd.read_parquet(out)["herl_m"].notna().any()
+    alone = Answer(capsys, "raim", *arguments[:6], "--json").json
+    assert alone["available"] > 0
+    assert Answer(capsys, "raim", *arguments[:8]).code == 2  # messages without --geo
+
+
 def test_help_names_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     answer = Answer(capsys, "protect", "--help")
     assert "Example:" in answer.out

@@ -1,0 +1,217 @@
+"""The ranges of a recording's fixes as arrays, satellites first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from sbas.exceptions import InputError
+from sbas.findings import Finding
+from sbas.monitoring.normal_equations import Bools, Floats, Ints
+from sbas.monitoring.verdicts import MonitorReason
+from sbas.recording import Recording
+from sbas.satellite_table import SIDE_TABLE
+
+SYSTEMS = "GRECJI"
+"""RINEX letters of constellations with a clock of their own; SBAS satellites (S) keep GPS time."""
+RADIANS_BELOW = 6.3
+USUAL_SIGMA_M = 0.05, 50.0
+NEEDED = ("satellite", "elevation_deg", "azimuth_deg", "used")
+
+Sigma = float | tuple[float, float] | None
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRanges:
+    """Ranges of (n,) epochs of a recording in (s, n) slots.
+
+    `used` False where a slot is empty; `clock` constellation of each; `satellite` index into
+    `names`, -1 where empty; `reason` (n,) of MonitorReason where an epoch's ranges do not make up
+    its fix, 0 elsewhere. `masked` ranges lie below the elevation mask.
+    """
+
+    elevation_deg: Floats
+    azimuth_deg: Floats
+    sigma_m: Floats
+    residual_m: Floats
+    clock: Ints
+    used: Bools
+    satellite: Ints
+    names: tuple[str, ...]
+    reason: Ints
+    has_residuals: bool
+    masked: int
+    findings: tuple[Finding, ...]
+
+
+def has_ranges(recording: Recording) -> bool:
+    """True where the recording says which satellites were used, and in which direction."""
+    side = recording.side_tables.get(SIDE_TABLE)
+    return side is not None and all(name in side.columns for name in NEEDED)
+
+
+def recorded_ranges(
+    recording: Recording, *, sigma: Sigma = None, elevation_mask_deg: float | None = None
+) -> RecordedRanges:
+    """Ranges used in a recording's fixes.
+
+    Parameters
+    ----------
+    sigma : None takes `sigma_m` of the satellite table; a number is the 1-sigma of every range
+        [m]; two numbers a, b [m] mean the root of a^2 + (b / sin elevation)^2.
+    elevation_mask_deg : ranges below take no part, as if the fix had not used them.
+
+    Raises
+    ------
+    InputError : no such table, angles in radians, elevations beyond 90 degrees, or satellites of
+        no known constellation.
+    """
+    side = recording.side_tables.get(SIDE_TABLE)
+    needed = NEEDED if sigma is not None else (*NEEDED, "sigma_m")
+    lacking = needed if side is None else [name for name in needed if name not in side.columns]
+    if side is None or lacking:
+        raise InputError(
+            "the recording does not say which satellites were used, and how",
+            evidence=f"side table {SIDE_TABLE!r}: no {', '.join(lacking)}",
+            cure="sbas protect makes such a recording; with ranges of unknown sigma give --sigma",
+        )
+    rows = np.flatnonzero(side["used"].to_numpy())
+    stamps = side["time"].to_numpy()[rows].astype("M8[ns]").astype(np.int64)
+    order = np.argsort(stamps, kind="stable")
+    rows, stamps = rows[order], stamps[order]
+    elevation, azimuth = (
+        side[name].to_numpy(np.float64)[rows] for name in ("elevation_deg", "azimuth_deg")
+    )
+    _check_angles(elevation, azimuth)
+    code, names, clock_of = _satellites(side["satellite"])
+    code = code[rows]
+    clock = clock_of[code]
+    spread = _sigmas(side, rows, elevation, sigma)
+    has_residuals = "residual_m" in side.columns
+    residual = (
+        side["residual_m"].to_numpy(np.float64)[rows] if has_residuals else np.zeros(rows.size)
+    )
+    findings = list(_sigma_findings(spread))
+    low = (
+        np.zeros(rows.size, bool) if elevation_mask_deg is None else elevation < elevation_mask_deg
+    )
+    epoch, slot, reason, lost = _places(recording, stamps)
+    if lost:
+        findings.append(
+            Finding(
+                "E25", "warning", "satellites at times at which the recording has no epoch",
+                where=f"side table {SIDE_TABLE!r}", evidence=f"{lost} rows of {rows.size}",
+                cure="they are left out; give the table and the epochs the same times",
+            )
+        )  # fmt: skip
+    n = len(recording)
+    known = epoch >= 0
+    sound = np.isfinite(elevation + azimuth) & np.isfinite(spread) & (spread > 0)
+    sound &= (np.isfinite(residual) & (code >= 0)) | low
+    faulty = known & ~sound & ~low
+    reason[epoch[faulty & (reason[epoch] == 0)]] = MonitorReason.INCOMPLETE
+    key = epoch * (len(names) + 1) + code + 1
+    _, first, count = np.unique(key, return_index=True, return_counts=True)
+    twice = epoch[first[count > 1]]
+    reason[twice[twice >= 0]] = MonitorReason.TWICE
+    keep = known & ~low
+    at = (slot[keep], epoch[keep])
+    shape = (int(slot[keep].max(initial=-1)) + 1, n)
+
+    def slots(values: NDArray[Any], empty: float) -> NDArray[Any]:
+        array = np.full(shape, empty, values.dtype)
+        array[at] = values[keep]
+        return array
+
+    return RecordedRanges(
+        slots(elevation, np.nan), slots(azimuth, np.nan), slots(spread, np.nan),
+        slots(residual, np.nan), slots(clock, 0), slots(np.ones(rows.size, bool), False),
+        slots(code, -1), names, reason, has_residuals, int((low & known).sum()), tuple(findings),
+    )  # fmt: skip
+
+
+def _satellites(column: pd.Series) -> tuple[Ints, tuple[str, ...], Ints]:
+    """Codes of the rows, names by code, and constellations by code (the last for none)."""
+    if not isinstance(column.dtype, pd.CategoricalDtype):
+        column = column.astype("category")
+    names = tuple(str(name) for name in column.cat.categories)
+    code = column.cat.codes.to_numpy().astype(np.int64)
+    letters = ["G" if name[:1] == "S" else name[:1] for name in names]
+    present = {letters[number] for number in np.unique(code[code >= 0]).tolist()}
+    unknown = sorted(letter for letter in present if not letter or letter not in SYSTEMS)
+    if unknown:
+        raise InputError(
+            "satellites of no known constellation", where=f"side table {SIDE_TABLE!r}",
+            evidence=f"first letters {', '.join(map(repr, unknown))}",
+            cure="RINEX 3 names such as G05, R12, E01, C30, S36",
+        )  # fmt: skip
+    clocks = sorted(present)
+    numbers = [clocks.index(letter) if letter in present else 0 for letter in letters]
+    return code, names, np.array([*numbers, 0], np.int64)
+
+
+def _check_angles(elevation_deg: Floats, azimuth_deg: Floats) -> None:
+    e, a = (np.abs(values[np.isfinite(values)]) for values in (elevation_deg, azimuth_deg))
+    if e.size and e.max() > 90:
+        raise InputError(
+            "elevations beyond 90 degrees", code="E08", where="elevation_deg",
+            evidence=f"up to {e.max():g}", cure="degrees above the horizon",
+        )  # fmt: skip
+    # A few satellites in one place low in the north are no proof; many epochs are.
+    if e.size >= 20 and e.max() <= RADIANS_BELOW / 4 and a.max(initial=0) <= RADIANS_BELOW:
+        raise InputError(
+            "directions of satellites look like radians", code="E08",
+            evidence=f"elevations up to {e.max():g}, azimuths up to {a.max(initial=0):g}",
+            cure="give degrees",
+        )  # fmt: skip
+
+
+def _sigmas(side: pd.DataFrame, rows: Ints, elevation_deg: Floats, sigma: Sigma) -> Floats:
+    if sigma is None:
+        values: Floats = side["sigma_m"].to_numpy(np.float64)[rows]
+        return values
+    a, b = (sigma, 0.0) if not isinstance(sigma, tuple) else sigma
+    if not (0 <= a < np.inf and 0 <= b < np.inf and a + b > 0):
+        raise InputError("sigma needs numbers of 0 or more, one above 0 [m]", evidence=f"{sigma}")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slant = np.where(b > 0, b / np.sin(np.deg2rad(np.maximum(elevation_deg, 0.0))), 0.0)
+    model: Floats = np.hypot(a, slant)
+    return model
+
+
+def _sigma_findings(sigma_m: Floats) -> tuple[Finding, ...]:
+    known = sigma_m[np.isfinite(sigma_m) & (sigma_m > 0)]
+    middle = float(np.median(known)) if known.size else 1.0
+    if USUAL_SIGMA_M[0] <= middle <= USUAL_SIGMA_M[1]:
+        return ()
+    return (
+        Finding(
+            "E08", "warning", "the ranges' sigmas are unusual: variances, or another unit?",
+            where="sigma_m", evidence=f"median {middle:g} m",
+            cure="give 1-sigma in metres; --sigma sets it",
+        ),
+    )  # fmt: skip
+
+
+def _places(recording: Recording, stamps: Ints) -> tuple[Ints, Ints, Ints, int]:
+    """Epoch (-1 where the recording has none) and slot of sorted rows, (n,) reasons of epochs,
+    and the number of rows without one."""
+    time = recording.time.astype("M8[ns]").astype(np.int64)
+    order = np.argsort(time, kind="stable")
+    ordered = time[order]
+    n = time.size
+    reason = np.full(n, MonitorReason.NO_SATELLITES, np.int8)
+    at = np.minimum(np.searchsorted(ordered, stamps), max(n - 1, 0))
+    found = (ordered[at] == stamps) if n else np.zeros(stamps.size, bool)
+    epoch = np.where(found, order[at] if n else -1, -1)
+    reason[epoch[found]] = MonitorReason.NONE
+    again = np.flatnonzero(ordered[1:] == ordered[:-1])
+    for one in (again, again + 1):
+        reason[order[one]] = MonitorReason.TIME_TWICE
+    first = np.flatnonzero(np.diff(stamps, prepend=stamps[:1] - 1)) if stamps.size else stamps
+    start = np.repeat(first, np.diff(first, append=stamps.size))
+    return epoch, np.arange(stamps.size) - start, reason, int((~found).sum())
