@@ -384,6 +384,12 @@ def _remarks(tally: StateTally, with_flags: bool) -> Iterable[Finding]:
             "E07", "info",
             f"{tally.declared_none:,} epochs have a position and the mode none: no fix, missing",
         )  # fmt: skip
+    if tally.raim_failed:
+        yield Finding(
+            "E07", "info",
+            f"{tally.raim_failed:,} epochs have a position whose RAIM found a fault: detected, "
+            "hence missing",
+        )  # fmt: skip
     if tally.unjudged_starts:
         yield Finding(
             "E04", "warning",

@@ -60,6 +60,7 @@ class StateTally:
         self.completed, self.censored, self.rooms = Lengths(), Lengths(), Lengths()
         self.cuts = self.short_steps = self.across_labels = 0
         self.without_truth = self.incomplete = self.declared_none = self.unjudged_starts = 0
+        self.raim_failed = 0
         self.truth_sigma_h_m = 0.0
         self._seen = 0
         self._offset = 0
@@ -118,16 +119,19 @@ class StateTally:
         hpe = errors["hpe_m"].to_numpy()
         formed = np.isfinite(hpe)
         self.declared_none += int(np.sum(delivered & none & ~fault))
-        fix = delivered & ~none
-        # The logger lost the position's own record: the receiver may well have had one.
         flags = batch["flags"].to_numpy()
+        # A fault that RAIM has found is no correct position, and no undetected wrong one.
+        alarmed = delivered & ~none & ((flags & np.uint32(Flag.RAIM_FAILED)) != 0)
+        self.raim_failed += int(np.sum(alarmed & ~fault))
+        fix = delivered & ~none & ~alarmed
+        # The logger lost the position's own record: the receiver may well have had one.
         lost = ~delivered & ~none & ((flags & np.uint32(Flag.EPOCH_INCOMPLETE)) != 0)
         code = np.where(hpe >= self.threshold_m, WRONG, CORRECT)
         code[fix & ~formed] = UNKNOWN
         code[~fix] = MISSING
         code[lost] = UNKNOWN
         code[fault] = HARDWARE
-        seen = np.where(fault, _HARDWARE_SEEN, np.where(fix, _FIX_SEEN, 0))
+        seen = np.where(fault, _HARDWARE_SEEN, np.where(fix | alarmed, _FIX_SEEN, 0))
         latest = np.maximum.accumulate(np.where(seen > 0, np.arange(seen.size), -1))
         state = np.where(latest >= 0, seen[latest], self._seen)
         code[(code == MISSING) & (state == _HARDWARE_SEEN)] = WAITING

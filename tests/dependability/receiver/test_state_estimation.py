@@ -16,7 +16,7 @@ from sbas.dependability.receiver.state_estimation import ReceiverStates, receive
 from sbas.estimate import Refusal
 from sbas.exceptions import InputError
 from sbas.integrity.position_error import position_errors
-from sbas.recording import Recording
+from sbas.recording import Flag, Recording
 from sbas.truth import FixedPoint
 from tests.dependability.state_recordings import TRUTH, chain_states, state_recording
 
@@ -80,6 +80,17 @@ def test_unknown_epochs_and_declared_fixes() -> None:
     assert found.epochs["missing"] == 1
     assert found.chain.counts == ((2, 0, 1), (0, 0, 0), (1, 0, 0))
     assert {"E10", "E07"} <= {f.code for f in found.findings}
+
+
+def test_a_fault_that_raim_found_is_missing_neither_correct_nor_wrong() -> None:
+    recording = state_recording("1122" * 20)
+    flags = recording.table["flags"].to_numpy().copy()
+    flags[[1, 3]] |= np.uint32(Flag.RAIM_FAILED)
+    found = receiver_states(
+        recording.replace(table=recording.table.assign(flags=flags)), truth=TRUTH, threshold_m=50
+    )
+    assert "hence missing" in " ".join(f.message for f in found.findings)
+    assert (found.epochs["correct"], found.epochs["wrong"], found.epochs["missing"]) == (39, 39, 2)
 
 
 def test_missing_at_the_begin_is_told() -> None:
