@@ -80,7 +80,7 @@ def fast_timeline(
     fast: FastCorrections, integrity: Integrity, reception: Reception
 ) -> FastTimeline:
     """Histories of all positions from the messages of types 0, 2 to 6 and 24."""
-    after_alarm = np.searchsorted(reception.alarm_s, fast.time_s, side="left")
+    after_alarm = np.searchsorted(reception.wiped_s, fast.time_s, side="left")
     changed = np.ones(fast.time_s.size, bool)
     changed[1:] = (np.diff(fast.iodp) != 0) | (np.diff(after_alarm) != 0)
     first = np.flatnonzero(changed)

@@ -83,6 +83,23 @@ class IonosphericGrid:
     bit_issue: Ints
 
 
+def contradicted_grids_s(masks: IonoMasks) -> Ints:
+    """(c,) when a band's mask came with the issue in force and other content; see
+    `sbas.augmentation.prn_masks.contradicted_masks_s`."""
+    found = []
+    last: dict[tuple[int, int], int] = {}
+    issue = -1
+    for row, (iodi, band) in enumerate(zip(masks.iodi.tolist(), masks.band.tolist(), strict=True)):
+        if iodi != issue:
+            last = {key: value for key, value in last.items() if key[0] == issue}
+            issue = iodi
+        before = last.get((iodi, band))
+        if before is not None and not np.array_equal(masks.point[before], masks.point[row]):
+            found.append(int(masks.time_s[row]))
+        last[iodi, band] = row
+    return np.array(found, np.int64)
+
+
 def ionospheric_grid(masks: IonoMasks, delays: IonoDelays, alarm_s: Ints) -> IonosphericGrid:
     """Replay masks and delays in the order of time.
 

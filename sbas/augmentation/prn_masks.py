@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from sbas.augmentation.message_types import Masks
 from sbas.augmentation.reception import Instants
 from sbas.augmentation.row_groups import row_groups
-from sbas.augmentation.tables import MASK_TIMEOUT_S
+from sbas.augmentation.tables import MASK_TIMEOUT_S, SLOW_TIMEOUT_S
 
 Ints = NDArray[np.int64]
 
 NOT_IN_MASK = -1
 NONE = -1
+FORGOTTEN_S = MASK_TIMEOUT_S + SLOW_TIMEOUT_S["npa"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,28 @@ def mask_timeline(masks: Masks, alarm_s: Ints) -> MaskTimeline:
     return MaskTimeline(
         masks.time_s[rows], masks.iodp[rows], position_of, masks.time_s[last], masks.time_s
     )
+
+
+def contradicted_masks_s(masks: Masks) -> Ints:
+    """(c,) when a mask came whose content is not that of the last one with its issue.
+
+    A service changes the issue with the content. After a gap of hours the two bits of the issue
+    may have come round; without a gap the mask contradicts itself. Either way what was heard
+    under the issue names other satellites now. An old mask that another issue has replaced for
+    longer than any of its data may live is forgotten.
+    """
+    found = []
+    last: dict[int, int] = {}
+    for row, issue in enumerate(masks.iodp.tolist()):
+        before = last.get(issue)
+        if before is not None:
+            replaced = bool((masks.iodp[before:row] != issue).any())
+            old = masks.time_s[row] - masks.time_s[before] > FORGOTTEN_S
+            same = np.array_equal(masks.prn_of[before], masks.prn_of[row])
+            if not same and not (replaced and old):
+                found.append(int(masks.time_s[row]))
+        last[issue] = row
+    return np.array(found, np.int64)
 
 
 def latest_of_slot(

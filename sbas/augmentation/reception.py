@@ -83,6 +83,8 @@ class Reception:
     session_s : (g,) first message after each gap that voids fast corrections.
     damaged_s : (d,) damaged messages that ended a row of `MOST_DAMAGED`.
     alarm_s : (a,) alarms.
+    wiped_s : (w,) nothing heard up to these seconds serves any more: alarms, and the seconds
+        before masks that contradict the one whose issue they bear.
     flight_time_ns : between the last bit's stamp and its reception.
     """
 
@@ -90,12 +92,13 @@ class Reception:
     session_s: Ints
     damaged_s: Ints
     alarm_s: Ints
+    wiped_s: Ints
     flight_time_ns: int
 
     def instants(self, time_ns: Ints) -> Instants:
         """Epochs, in nanoseconds since the GPS epoch, as the messages see them."""
         second = (time_ns - self.flight_time_ns) // NS_PER_S
-        since_s = _latest_value(self.alarm_s, second)
+        since_s = _latest_value(self.wiped_s, second)
         return Instants(time_ns, second, since_s, self.flight_time_ns)
 
     def session(self, second: Ints) -> Ints:
@@ -119,8 +122,9 @@ class Reception:
             return np.ones(index.size, bool)
         last = self.heard_s[index]
         missing = (instants.time_ns - last * NS_PER_S - self.flight_time_ns) // NS_PER_S
-        barred = instants.second - instants.since_s <= ALARM_S
-        lost: Bools = (index < 0) | (missing >= MOST_LOST) | ((instants.since_s > NEVER) & barred)
+        alarm_s = _latest_value(self.alarm_s, instants.second)
+        barred = (alarm_s > NEVER) & (instants.second - alarm_s <= ALARM_S)
+        lost: Bools = (index < 0) | (missing >= MOST_LOST) | barred
         return lost
 
 
@@ -158,7 +162,7 @@ def receive(
     barred = (since > 0) & (since <= ALARM_S)
     without_content = is_alarm if alarms == "as_mt2" else type_0
     return _without(messages, barred | without_content), Reception(
-        heard, heard[gap + 1], damaged_s, alarm_s, round(flight_time_s * NS_PER_S)
+        heard, heard[gap + 1], damaged_s, alarm_s, alarm_s, round(flight_time_s * NS_PER_S)
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,15 @@ from sbas.augmentation.degradation import DegradationAt, degradation_at
 from sbas.augmentation.delta_udre import CovarianceAt, covariance_of_slot
 from sbas.augmentation.fast_corrections import FastAt, FastSource, Profile, fast_at
 from sbas.augmentation.fast_history import FastTimeline, fast_timeline
-from sbas.augmentation.ionospheric_grid import IonosphericGrid, ionospheric_grid
+from sbas.augmentation.ionospheric_grid import (
+    IonosphericGrid,
+    contradicted_grids_s,
+    ionospheric_grid,
+)
 from sbas.augmentation.long_term import LongTermAt, last_of_other_issue, long_term_of_slot
 from sbas.augmentation.message_types import Decoded
 from sbas.augmentation.messages import SbasMessages
-from sbas.augmentation.prn_masks import MaskTimeline, mask_timeline
+from sbas.augmentation.prn_masks import MaskTimeline, contradicted_masks_s, mask_timeline
 from sbas.augmentation.reception import AlarmRule, Instants, Reception, receive
 from sbas.augmentation.service_regions import RegionState, region_states
 from sbas.augmentation.tables import Mode
@@ -34,7 +38,8 @@ class CorrectionTimeline:
     """What one SBAS satellite said, ready to be looked up at any epoch.
 
     `other_issue` is of `last_of_other_issue`; `alarms_ignored` counts messages of type 0 that
-    were not taken as alarms, which makes a result one of a test signal.
+    were not taken as alarms, which makes a result one of a test signal; `contradicted_s` (c,)
+    when masks came whose content is not that of their issue.
     """
 
     prn: int
@@ -46,6 +51,7 @@ class CorrectionTimeline:
     regions: tuple[RegionState, ...]
     other_issue: Ints
     alarms_ignored: int
+    contradicted_s: Ints
 
     @property
     def void(self) -> Mapping[int, int]:
@@ -107,14 +113,20 @@ def correction_timeline(
     type_0 = int(np.count_nonzero(messages.kind == 0))
     kept, reception = receive(messages, alarms=alarms, flight_time_s=flight_time_s)
     decoded = decode(kept)
+    contradicted = np.union1d(
+        contradicted_masks_s(decoded.masks), contradicted_grids_s(decoded.iono_masks)
+    )
+    wiped_s = np.union1d(reception.alarm_s, contradicted - 1)
+    reception = replace(reception, wiped_s=wiped_s)
     return CorrectionTimeline(
         messages.prns[0],
         decoded,
         reception,
-        mask_timeline(decoded.masks, reception.alarm_s),
+        mask_timeline(decoded.masks, wiped_s),
         fast_timeline(decoded.fast, decoded.integrity, reception),
-        ionospheric_grid(decoded.iono_masks, decoded.iono_delays, reception.alarm_s),
-        region_states(decoded.service_regions, reception.alarm_s),
+        ionospheric_grid(decoded.iono_masks, decoded.iono_delays, wiped_s),
+        region_states(decoded.service_regions, wiped_s),
         last_of_other_issue(decoded.long_term),
         type_0 - reception.alarm_s.size,
+        contradicted,
     )

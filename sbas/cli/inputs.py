@@ -179,7 +179,7 @@ class Repairing:
         str | None, _repair(metavar="day|week", help="Advance the date where time falls back.")
     ] = None
     leap_slip: Annotated[
-        str | None, _repair(metavar="fix", help="Take out a step of a leap second (E11).")
+        str | None, _repair(metavar="fix|fix-after", help="Take out a step of a leap second (E11).")
     ] = None
     shift_s: Annotated[float | None, _repair(help="Add to every time, in seconds.")] = None
     sort: Annotated[bool, _repair("--sort", help="Put epochs in the order of their times.")] = False
@@ -191,6 +191,9 @@ class Repairing:
     ] = None
     pl_frozen: Annotated[
         str | None, _repair(metavar="missing", help="Levels that stand still become missing.")
+    ] = None
+    pl_sentinel: Annotated[
+        float | None, _repair(help="Protection levels of this value stand for none.")
     ] = None
     pl_kind: Annotated[
         str | None, _repair(metavar="do229|raim|...", help="What the protection levels are.")

@@ -17,7 +17,7 @@ from sbas.timescales import TimeScale, to_gps
 _BY_TIME = ["begin", "end", "label"]
 _BY_DISTANCE = ["from_m", "label", "to_m"]
 _DAY = r"\d{4}-\d\d-\d\d"
-_STAMP = re.compile(rf"({_DAY}(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d{{1,9}})?)?)?)(Z?)")
+_STAMP = re.compile(rf"({_DAY}(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d{{1,9}})?)?)?)(Z|[+-]\d\d:?\d\d)?")
 _NUMBER = re.compile(r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?")
 
 
@@ -30,12 +30,13 @@ def load_segments(
     ----------
     path : a file with the header `label,begin,end` (ISO 8601 dates and times) or
         `label,from_m,to_m`, this with or without `track_id`; fields in any order.
-    time_scale : of the times in the file.
+    time_scale : of the times in the file; those marked `Z` are UTC whatever it says.
 
     Raises
     ------
-    InputError : unknown or missing fields, a time or number that cannot be read, or segments
-        that EnvironmentSegments refuses.
+    InputError : unknown or missing fields, a time or number that cannot be read, times of which
+        only some are marked as UTC, an offset from UTC, or segments that EnvironmentSegments
+        refuses.
     """
     source = Path(path)
     try:
@@ -74,8 +75,11 @@ def _maker(
 ) -> Callable[[dict[str, str]], TimeSegment | TrackSegment]:
     """What makes a segment of a row's fields."""
     if sorted(header) == _BY_TIME:
+        marked: set[bool] = set()
         return lambda row: TimeSegment(
-            _time(row["begin"], time_scale), _time(row["end"], time_scale), row["label"]
+            _time(row["begin"], time_scale, marked),
+            _time(row["end"], time_scale, marked),
+            row["label"],
         )
     if sorted(header) in (_BY_DISTANCE, sorted([*_BY_DISTANCE, "track_id"])):
         return lambda row: TrackSegment(
@@ -88,7 +92,8 @@ def _maker(
     )
 
 
-def _time(text: str, scale: TimeScale) -> np.datetime64:
+def _time(text: str, scale: TimeScale, marked: set[bool]) -> np.datetime64:
+    """GPS time of a stamp; `marked` collects whether the file's stamps name UTC."""
     match = _STAMP.fullmatch(text)
     try:
         if match is None:
@@ -99,12 +104,18 @@ def _time(text: str, scale: TimeScale) -> np.datetime64:
             f"no time: {text!r}", evidence=str(error), cure="write ISO 8601, as in "
             "2026-11-22T06:30:00",
         ) from error  # fmt: skip
-    if match[2] and scale != "UTC":
+    if match[2] not in (None, "Z"):
         raise InputError(
-            f"{text!r} is marked as UTC, and the times are said to be {scale}",
-            cure="time_scale='UTC'",
+            f"{text!r} names an offset from UTC", cure="write UTC with a Z, or GPS time without"
         )
-    gps: np.datetime64 = to_gps(np.array([time]), scale)[0]
+    marked.add(bool(match[2]))
+    if len(marked) > 1 and scale != "UTC":
+        raise InputError(
+            f"some times are marked as UTC, and others are taken as {scale}",
+            evidence=repr(text),
+            cure="mark all times with Z, or none",
+        )
+    gps: np.datetime64 = to_gps(np.array([time]), "UTC" if match[2] else scale)[0]
     return gps
 
 

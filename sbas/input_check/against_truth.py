@@ -5,7 +5,7 @@ E03, E08, E09 and E12 by a bounded sample of epochs.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +31,8 @@ GEOID_M = (10.0, 110.0)
 """Size of a mean up error that a geoid undulation explains."""
 GEOID_SIGMA_M = 5.0
 ANTENNA_M = (0.1, 5.0)
+KNOW_GEOID = frozenset(("csv", "nmea", "rtklib_pos"))
+"""Formats with heights above the geoid, whose readers take `--geoid`."""
 UNIT_FITS_M = 100.0
 _BLOCKS = 10
 
@@ -119,29 +121,40 @@ def fitting_units(pair: Comparison, ranges: CoordinateRanges) -> list[str]:
 def far_away(facts: Survey, pair: Comparison) -> Iterator[Judged]:
     """E12: positions far from the truth, with the distance of the likely mistakes."""
     lat, lon = pair.lat_deg, pair.lon_deg
-    tries = {
-        "as given": pair.distance_km(lat, lon),
-        "latitude and longitude swapped": pair.distance_km(lon, lat),
-        "-latitude": pair.distance_km(-lat, lon),
-        "-longitude": pair.distance_km(lat, -lon),
+    tries = {"as given": pair.distance_km(lat, lon)}
+    # Signs count after the exchange, as `repair` makes them.
+    tries |= {
+        name: pair.distance_km(*(sign * v for sign, v in zip(signs, places, strict=True)))
+        for swap, places in (("", (lat, lon)), (_SWAPPED, (lon, lat)))
+        for name, signs in ((swap + minus, s) for minus, s in _SIGNS.items())
+        if name
     }
     still = facts.static and isinstance(pair.truth, FixedPoint)
     limit_km = STATIC_LIMIT_KM if still else MOVING_LIMIT_KM
     if not tries["as given"] > limit_km:
         return
-    listed = ", ".join(f"{name} {km:.4g} km" for name, km in tries.items() if np.isfinite(km))
-    repairs: dict[str, tuple[str, dict[str, object]]] = {
-        "latitude and longitude swapped": ("--swap-latlon", {"swap_latlon": True}),
-        "-latitude": ("--sign lat", {"sign": "lat"}),
-        "-longitude": ("--sign lon", {"sign": "lon"}),
-    }
-    near = [n for n in repairs if tries[n] < limit_km and tries[n] < 0.1 * tries["as given"]]
-    cure, repair = "correct --truth LAT,LON,HEIGHT (degrees, latitude first)", {}
+    listed = ", ".join(
+        f"{name.strip()} {km:.4g} km" for name, km in tries.items() if np.isfinite(km)
+    )
+    near = [n for n in tries if tries[n] < limit_km and tries[n] < 0.1 * tries["as given"]]
+    cure = "correct --truth LAT,LON,HEIGHT (degrees, latitude first)"
+    repair: dict[str, object] = {}
     message = "the recording's median position is far from the truth"
     if len(near) == 1:
-        cure, repair = repairs[near[0]][0] + ", or correct --truth", repairs[near[0]][1]
-        message += f": {near[0]}?"
+        words = []
+        if near[0].startswith(_SWAPPED):
+            words, repair = ["--swap-latlon"], {"swap_latlon": True}
+        if which := _WHICH.get(near[0].removeprefix(_SWAPPED)):
+            words, repair = [*words, f"--sign {which}"], {**repair, "sign": which}
+        cure = " ".join(words) + ", or correct --truth"
+        message += f": {near[0].strip()}?"
     yield judged("E12", "error", message, evidence=f"distance {listed}", cure=cure, repair=repair)
+
+
+_SWAPPED = "latitude and longitude swapped"
+_SIGNS = {"": (1, 1), " -latitude": (-1, 1), " -longitude": (1, -1),
+          " -latitude -longitude": (-1, -1)}  # fmt: skip
+_WHICH = {" -latitude": "lat", " -longitude": "lon", " -latitude -longitude": "both"}
 
 
 def against_track(sample: SampledEpochs, line: TrackLine) -> Iterator[Judged]:
@@ -173,7 +186,7 @@ def heights_in_another_unit(pair: Comparison) -> Iterator[Judged]:
     )  # fmt: skip
 
 
-def constant_offsets(pair: Comparison) -> Iterator[Judged]:
+def constant_offsets(pair: Comparison, formats: Collection[str] = ()) -> Iterator[Judged]:
     """E09: mean errors that a geoid, an antenna height or another frame explains.
 
     A receiver's own errors change slowly: a mean counts only where it exceeds six standard
@@ -195,8 +208,7 @@ def constant_offsets(pair: Comparison) -> Iterator[Judged]:
         yield judged(
             "E09", "warning", "heights differ from the truth by what a geoid undulation may be",
             evidence=f"mean up error {mean_u.value:.2f} m, spread {mean_u.spread:.2f} m",
-            cure="state --geoid UNDULATION for heights above the geoid, of the recording or of "
-            "the truth",
+            cure=_geoid_cure(formats),
         )  # fmt: skip
     elif ANTENNA_M[0] <= tall < GEOID_M[0] and mean_u.certain(sigma_v) and across < tall / 2:
         yield judged(
@@ -215,6 +227,17 @@ def constant_offsets(pair: Comparison) -> Iterator[Judged]:
             "ITRF and ETRS89 part by 2.5 cm a year since 1989",
             cure="give the truth in the recording's frame and of the antenna; --frame",
         )  # fmt: skip
+
+
+def _geoid_cure(formats: Collection[str]) -> str:
+    """What to state, with an option that works: not every reader knows the geoid."""
+    cure = (
+        "--height-offset UNDULATION (such as --height-offset 44.5: the published geoid undulation "
+        "of the place, not this mean) where the recording's heights are above the geoid"
+    )
+    if formats and KNOW_GEOID.issuperset(formats):
+        cure += ", or --geoid UNDULATION where its altitudes were read without one"
+    return cure + "; --truth-geoid UNDULATION where the truth's are"
 
 
 @dataclass(frozen=True)

@@ -24,15 +24,16 @@ from sbas.input_check import (
     time_order,
 )
 from sbas.input_check.against_truth import Comparison
+from sbas.input_check.alternation import Alternation
 from sbas.input_check.coordinates import CoordinateRanges
 from sbas.input_check.frozen_values import FrozenRuns
 from sbas.input_check.judgement import Judged
 from sbas.input_check.leap_steps import LeapSteps
 from sbas.input_check.protection_levels import LevelModes
-from sbas.input_check.receivers import Alternation, Seams
+from sbas.input_check.receivers import Seams
 from sbas.input_check.repairs import Repairs
 from sbas.input_check.sampled_epochs import SampledEpochs
-from sbas.input_check.time_lag import time_lag
+from sbas.input_check.time_lag import early_fits, time_lag
 from sbas.input_check.time_order import TimeOrder
 from sbas.recording import EpochSource
 from sbas.recording_survey import Survey, sampling_interval_ns, survey
@@ -78,7 +79,7 @@ class CheckResult:
 class _Watches:
     """Everybody who looks at the epochs along with the survey."""
 
-    def __init__(self, interval_ns: int) -> None:
+    def __init__(self, interval_ns: int, files: int) -> None:
         self.order = TimeOrder()
         self.leaps = LeapSteps(interval_ns)
         self.ranges = CoordinateRanges()
@@ -86,7 +87,7 @@ class _Watches:
         self.levels = FrozenRuns(("hpl_m",))
         self.positions = FrozenRuns(("lat_deg", "lon_deg"))
         self.alternation = Alternation()
-        self.seams = Seams(interval_ns)
+        self.seams = Seams(interval_ns, files)
         self.sample = SampledEpochs()
 
     def all(self) -> tuple[Any, ...]:
@@ -111,7 +112,7 @@ def check(
     findings, with every code and its threshold.
     """
     interval_ns = sampling_interval_ns(source)
-    watches = _Watches(interval_ns)
+    watches = _Watches(interval_ns, len(source.meta.sources))
     facts = survey(source, interval_ns=interval_ns, watches=watches.all())
     date = np.datetime64("today") if today is None else today
     found = tuple(_judgements(source, facts, watches, truth, date))
@@ -146,7 +147,13 @@ def _judgements(
     yield from time_order.backward(facts, order, slips)
     repeating = sum(step.before_ns == step.after_ns for step in leaps)
     yield from time_order.repeated(facts, repeating, bool(alternating))
-    yield from watches.leaps.judgements()
+    pair = None
+    if truth is not None and not isinstance(truth, TrackLine) and watches.sample.time_ns.size:
+        pair = Comparison.of(watches.sample, truth)
+    early = False
+    if leaps and pair is not None and isinstance(truth, Trajectory):
+        early = early_fits(pair, watches.sample.row, leaps[0].row, leaps[-1].row)
+    yield from watches.leaps.judgements(early)
     shifted = tuple(
         dates.dates(
             facts,
@@ -162,36 +169,40 @@ def _judgements(
     yield from time_order.lost(facts, slips)
     yield from alternating
     yield from watches.seams.judgements(facts)
-    pair = None
     if isinstance(truth, TrackLine):
         yield from against_truth.against_track(watches.sample, truth)
-    elif truth is not None and watches.sample.time_ns.size:
-        pair = Comparison.of(watches.sample, truth)
     misread = tuple(_coordinates(facts, watches, pair))
     yield from misread
-    hpe_median_m = float("nan")
+    errors_m = {}
     if pair is not None and not misread:
         far = tuple(against_truth.far_away(facts, pair))
         yield from far
         if not far:
-            lagging = tuple(time_lag(pair)) if isinstance(truth, Trajectory) and not shifted else ()
+            # Over a corrected leap second there is no one lag; the next check finds what is left.
+            one_lag = isinstance(truth, Trajectory) and not shifted and not leaps
+            lagging = tuple(time_lag(pair)) if one_lag else ()
             yield from lagging
             tall = tuple(against_truth.heights_in_another_unit(pair)) or tuple(
                 coordinates.heights(watches.ranges)
             )
             yield from tall
             if not tall and all(one.finding.severity != "error" for one in lagging):
-                yield from against_truth.constant_offsets(pair)
-            east, north, _ = pair.errors_m()
-            if east.size:
-                hpe_median_m = float(np.median(np.hypot(east, north)))
+                yield from against_truth.constant_offsets(pair, {s.format for s in meta.sources})
+            errors_m = _median_errors_m(pair)
     yield from protection_levels.not_positive(facts)
     yield from frozen_values.frozen_levels(watches.levels)
     yield from frozen_values.frozen_positions(watches.positions)
     yield from protection_levels.definition(watches.modes, meta.pl, meta.findings)
-    yield from protection_levels.unit(
-        watches.modes, meta.pl, columns=source.columns, hpe_median_m=hpe_median_m
-    )
+    yield from protection_levels.stand_ins(watches.modes)
+    yield from protection_levels.unit(watches.modes, meta.pl, errors_m=errors_m)
+
+
+def _median_errors_m(pair: Comparison) -> dict[str, float]:
+    """Median sizes of the errors by the level that bounds them."""
+    east, north, up = pair.errors_m()
+    sizes = {"hpl_m": np.hypot(east, north), "vpl_m": np.abs(up)}
+    known = {name: size[np.isfinite(size)] for name, size in sizes.items()}
+    return {name: float(np.median(size)) for name, size in known.items() if size.size}
 
 
 def _coordinates(facts: Survey, watches: _Watches, pair: Comparison | None) -> Iterator[Judged]:

@@ -127,8 +127,13 @@ class LeapSteps:
             )  # fmt: skip
             self._found.setdefault(at, step)
 
-    def judgements(self) -> Iterator[Judged]:
-        """E11, once for all steps found."""
+    def judgements(self, early_fits: bool = False) -> Iterator[Judged]:
+        """E11, once for all steps found.
+
+        Parameters
+        ----------
+        early_fits : a truth says that the stamps before the first step are the right ones.
+        """
         if not self.steps:
             return
         first = self.steps[0]
@@ -143,10 +148,11 @@ class LeapSteps:
             cure, repair = "--time UTC", {"time": "UTC"}
         else:
             message = "time steps by whole seconds, the position does not: a leap second corrected"
-            cure, repair = (
-                "--leap-slip fix (the stamps behind the step stand)",
-                {"leap_slip": "fix"},
-            )
+            cure = "--leap-slip fix (the stamps behind the step stand)"
+            repair = {"leap_slip": "fix"}
+            if early_fits:
+                cure = "--leap-slip fix-after (the stamps before it stand: they fit the truth)"
+                repair = {"leap_slip": "fix-after"}
         mixed = bool(inserted) and len(inserted) < len(self.steps)
         yield judged(
             "E11", "error", message,

@@ -1,8 +1,8 @@
-"""Several receivers in one recording: epochs that alternate, stretches that differ (E06).
+"""Stretches of several receivers in one recording, one behind the other (E06).
 
-Epochs of two receivers written in turn show as values that jump at every epoch and are back two
-epochs later. Files of two receivers joined show at their seam, a gap or a step back in time:
-what no receiver changes by itself (digits, columns, rate) or several properties at once.
+Files of two receivers joined show at their seam, a gap or a step back in time: what no receiver
+changes by itself (digits, columns, rate, a place that nothing reaches in time) or several
+properties at once. Epochs written in turn are in `alternation`.
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ LEVEL_RATIO = 1.5
 SEAM_NS = 60 * NS_PER_S
 """A longer gap may join two files."""
 LEAST_EPOCHS = 60
-"""Epochs on either side that a comparison needs, and of which alternation must last."""
+"""Epochs on either side that a comparison needs."""
 WINDOW = 600
-ALTERNATING_M = 3.0
 STATIC_M = 10.0
 FASTEST_MPS = 150.0
 """Nothing on rails or roads is faster."""
+ELSEWHERE_M = 10_000.0
+"""A change of place beyond what `FASTEST_MPS` explains that no other sign is needed beside."""
 SATELLITES = 3
 PURE = 0.99
 """Share of a side's epochs in one mode, from which it counts as that side's."""
@@ -37,70 +38,6 @@ _NO_POSITION = -2
 _M_PER_DEG = 111_195.0
 
 Floats = NDArray[np.float64]
-
-
-class Alternation:
-    """Epochs that jump from the one before and are back where the one before that was."""
-
-    COLUMNS = ("lat_deg", "lon_deg", "hpl_m")
-
-    def __init__(self) -> None:
-        self.longest = self.first_row = self.first_ns = self.epochs = 0
-        self._length = self._row = self._ns = 0
-        self._tail = Tail(2, self.COLUMNS)
-
-    def update(self, rows: Rows) -> None:
-        joined, old = self._tail.before(rows)
-        lat, lon, hpl = (joined.values[name] for name in self.COLUMNS)
-        if len(joined) < 3:
-            return
-        last = slice(2, None)
-        cos = np.cos(np.radians(lat[last]))
-        one, two = (
-            _M_PER_DEG * np.hypot(lat[last] - lat[then], cos * (lon[last] - lon[then]))
-            for then in (slice(1, -1), slice(0, -2))
-        )
-        jumps = (one > ALTERNATING_M) & (one > 5 * two)
-        ratio_1, ratio_2 = (_ratio(hpl[last], hpl[then]) for then in (slice(1, -1), slice(0, -2)))
-        jumps |= (ratio_1 > LEVEL_RATIO) & (ratio_2 < 1.1)
-        # Rows 2.. of the joined ones, of which those before `old` were judged with the last batch.
-        jumps = jumps[max(old - 2, 0) :]
-        self._count(jumps, joined.part(len(joined) - jumps.size, len(joined)))
-
-    def _count(self, jumps: NDArray[np.bool_], rows: Rows) -> None:
-        edges = np.flatnonzero(np.diff(jumps, prepend=False, append=False))
-        begins, ends = edges[::2], edges[1::2]
-        if self._length and not (jumps.size and jumps[0]):
-            self._close()
-        for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
-            if begin or not self._length:
-                self._close()
-                self._row, self._ns = rows.first + begin, int(rows.time_ns[begin])
-            self._length += end - begin
-            if end < jumps.size:
-                self._close()
-
-    def _close(self) -> None:
-        if self._length >= LEAST_EPOCHS:
-            if self.epochs == 0:
-                self.first_row, self.first_ns = self._row, self._ns
-            self.epochs += self._length
-            self.longest = max(self.longest, self._length)
-        self._length = 0
-
-    def judgements(self) -> Iterator[Judged]:
-        """E06, where epochs alternate for a minute or more. Call it behind the last row."""
-        self._close()
-        if self.epochs:
-            yield judged(
-                "E06", "error", "epochs of two receivers, or of two solutions, alternate",
-                where=f"first from {place(self.first_row, self.first_ns)}",
-                evidence=f"{self.epochs:,} epochs jump in position by more than {ALTERNATING_M:g} "
-                f"m, or in HPL by {LEVEL_RATIO:g} times, and back at the next; longest run "
-                f"{self.longest:,}",
-                cure="write one receiver a file; where their times are equal, --duplicates first "
-                "keeps one of the two",
-            )  # fmt: skip
 
 
 def _ratio(a: Floats, b: Floats) -> Floats:
@@ -128,11 +65,14 @@ class Seams:
     Parameters
     ----------
     interval_ns : the median step.
+    files : number of files; where there are several, one may end without a gap, and a level
+        that changes at once is looked at as well.
     """
 
     COLUMNS = ("lat_deg", "lon_deg", "height_m", "hpl_m", "hdop", "n_sv", "mode")
 
-    def __init__(self, interval_ns: int) -> None:
+    def __init__(self, interval_ns: int, files: int = 1) -> None:
+        self.files = files
         self.least_ns = max(SEAM_NS, 2 * interval_ns)
         self.found: list[tuple[int, int, bool, str]] = []
         self._tail = Tail(2 * WINDOW, self.COLUMNS)
@@ -143,9 +83,22 @@ class Seams:
     def update(self, rows: Rows) -> None:
         joined, old = self._tail.before(rows)
         step = np.diff(joined.time_ns[max(old - 1, 0) :])
-        at = np.flatnonzero((step > self.least_ns) | (step < 0)) + max(old, 1)
+        odd = (step > self.least_ns) | (step < 0)
+        odd |= self._leaps(joined.part(max(old - 1, 0), len(joined)))
+        at = np.flatnonzero(odd) + max(old, 1)
         self._seams += (at + joined.first).tolist()
         self._judge(joined, joined.first + len(joined) - WINDOW)
+
+    def _leaps(self, rows: Rows) -> NDArray[np.bool_]:
+        """(n - 1,) True where the place, or in several files the level, changes at once."""
+        lat, lon = rows.values["lat_deg"], rows.values["lon_deg"]
+        north = np.diff(lat)
+        east = ((np.diff(lon) + 180) % 360 - 180) * np.cos(np.radians(lat[1:]))
+        leaps = _M_PER_DEG * np.hypot(north, east) > ELSEWHERE_M
+        if self.files > 1:
+            hpl = rows.values["hpl_m"]
+            leaps |= _ratio(hpl[1:], hpl[:-1]) > LEVEL_RATIO
+        return np.asarray(leaps)
 
     def _judge(self, joined: Rows, last: int) -> None:
         """Compare at the seams up to row `last`, behind which all rows of their window came."""
@@ -174,6 +127,9 @@ class Seams:
         waited_s = (int(after.time_ns[0]) - int(before.time_ns[-1])) / NS_PER_S
         if 0 < waited_s * FASTEST_MPS < apart:
             strong.append(f"{apart:.4g} m in {waited_s:g} s")
+        far = _beyond_reach_m(before, after)
+        if far > ELSEWHERE_M:
+            strong.append(f"{far:.4g} m farther apart than {FASTEST_MPS:g} m/s explain")
         if a.mode != b.mode and min(a.mode, b.mode) >= 0:
             weak.append(f"modes {MODES[a.mode]} and {MODES[b.mode]}")
         standing = max(a.spread_m, b.spread_m) < STATIC_M
@@ -184,7 +140,9 @@ class Seams:
             weak.append(f"medians {moved:.4g} m apart")
         differ = levels > LEVEL_RATIO
         sure = (differ and (bool(strong) or len(weak) >= 2)) or len(strong) >= 2
-        if sure or (differ and weak):
+        sure |= far > ELSEWHERE_M
+        unbroken = 0 <= waited_s * NS_PER_S <= self.least_ns and _apart(before, after)
+        if sure or (differ and (weak or unbroken)):
             hpl = [f"HPL medians {a.hpl_m:.4g} and {b.hpl_m:.4g} m"] if differ else []
             text = ", ".join([*hpl, *strong, *weak])
             self.found.append((after.first, int(after.time_ns[0]), sure, text))
@@ -270,6 +228,21 @@ def _first_position(rows: Rows) -> tuple[float, float]:
 def _last_position(rows: Rows) -> tuple[float, float]:
     turned = {name: values[::-1] for name, values in rows.values.items()}
     return _first_position(Rows(rows.first, rows.time_ns[::-1], turned))
+
+
+def _beyond_reach_m(before: Rows, after: Rows) -> float:
+    """Distance between the medians of the epochs next to a seam, less what is done in that time."""
+    a, b = before.part(len(before) - LEAST_EPOCHS, len(before)), after.part(0, LEAST_EPOCHS)
+    places = [(_median(r.values["lat_deg"]), _median(r.values["lon_deg"])) for r in (a, b)]
+    waited_s = abs(float(np.median(b.time_ns) - np.median(a.time_ns))) / NS_PER_S
+    return _distance_m(*places) - waited_s * FASTEST_MPS
+
+
+def _apart(before: Rows, after: Rows) -> bool:
+    """Whether the levels of most epochs next to a seam do not meet those of the other side."""
+    a, b = (r.values["hpl_m"] for r in (before.part(len(before) - LEAST_EPOCHS, len(before)),
+                                        after.part(0, LEAST_EPOCHS)))  # fmt: skip
+    return max(_quantile(a, 0.05), _quantile(b, 0.05)) > min(_quantile(a, 0.95), _quantile(b, 0.95))
 
 
 def _distance_m(a: tuple[float, float], b: tuple[float, float]) -> float:

@@ -14,7 +14,7 @@ from sbas.findings import Finding
 from sbas.input_check.coordinates import UNITS_M, to_degrees
 from sbas.input_check.frozen_values import LARGEST_LEVEL_M, FrozenRuns
 from sbas.input_check.judgement import counted
-from sbas.recording import COLUMNS, Recording, mode_categories
+from sbas.recording import COLUMNS, Flag, Recording, mode_categories, with_columns
 from sbas.recording_survey import epoch_rows
 
 Repaired = tuple[Recording, list[Finding]]
@@ -62,12 +62,13 @@ def swapped(recording: Recording, _: bool) -> Repaired:
     return _changed(recording, {"lat_deg": lon, "lon_deg": lat}, text)
 
 
-def with_sign(recording: Recording, axis: str) -> Repaired:
-    """Latitude, or longitude, with the other sign."""
-    name = f"{axis}_deg"
-    values = _column(recording, name)
-    number = int(np.isfinite(values).sum())
-    return _changed(recording, {name: -values}, f"{number:,} values of {name} negated (--sign)")
+def with_sign(recording: Recording, which: str) -> Repaired:
+    """Latitude, longitude or both with the other sign."""
+    names = {"lat": ("lat_deg",), "lon": ("lon_deg",), "both": ("lat_deg", "lon_deg")}[which]
+    new = {name: -_column(recording, name) for name in names}
+    number = int(np.isfinite(new[names[0]]).sum())
+    text = f"{number:,} values of {' and '.join(names)} negated (--sign)"
+    return _changed(recording, new, text)
 
 
 def raised(recording: Recording, offset_m: float) -> Repaired:
@@ -87,6 +88,24 @@ def without_zero_levels(recording: Recording, _: str) -> Repaired:
             text = f"{int(wrong.sum()):,} {name} <= 0 made missing (--pl-zero)"
             recording, remark = _changed(recording, {name: new}, text)
             remarks += remark
+    return recording, remarks
+
+
+def without_stand_ins(recording: Recording, value: float) -> Repaired:
+    """Protection levels of a value that stands for none made missing, and flagged so."""
+    remarks = []
+    for name in ("hpl_m", "vpl_m"):
+        if name not in recording.table:
+            continue
+        wrong = recording.table[name].to_numpy() == value
+        if not wrong.any():
+            continue
+        flags = with_columns(recording.table, ["flags"])["flags"].to_numpy().copy()
+        flags[wrong] |= np.uint32(Flag.PL_SENTINEL)
+        new = {name: np.where(wrong, np.nan, recording.table[name].to_numpy()), "flags": flags}
+        text = f"{int(wrong.sum()):,} {name} of {value:g} made missing (--pl-sentinel)"
+        recording, remark = _changed(recording, new, text)
+        remarks += remark
     return recording, remarks
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -13,9 +15,19 @@ from sbas.input_check.leap_steps import LeapStep, LeapSteps
 from sbas.input_check.time_order import DAY_NS, WEEK_NS, wraps
 from sbas.recording import Recording
 from sbas.recording_survey import Ints, epoch_rows, sampling_interval_ns
-from sbas.timescales import NS_PER_S, TimeScale, gpst_minus_utc_s, to_gps
+from sbas.timescales import (
+    NS_PER_S,
+    TimeScale,
+    gps_to_utc,
+    gpst_minus_utc_s,
+    to_gps,
+    utc_to_gps,
+)
 
 Repaired = tuple[Recording, list[Finding]]
+
+_WAS_UTC = re.compile(r"(from (UTC|GLONASST|JST) to|in (UTC|GLONASST), now in) GPS time")
+"""What readers (E25) and `from_scale` (E26) say of times that hang on the leap seconds."""
 
 
 def from_scale(recording: Recording, scale: TimeScale) -> Repaired:
@@ -46,10 +58,30 @@ def from_scale(recording: Recording, scale: TimeScale) -> Repaired:
 
 
 def weeks_later(recording: Recording, weeks: int) -> Repaired:
-    """Every time moved by whole weeks."""
-    changed = _with_times(recording, lambda label, _: label + weeks * WEEK_NS)
+    """Every time moved by whole weeks, on the scale of its stamps.
+
+    Stamps that were UTC came to GPS time by the leap seconds of the wrong date: they go back, are
+    moved, and come to GPS time by those of the right one.
+    """
     text = f"{counted(len(recording), 'epoch')} moved by {weeks:+d} weeks (--week-rollover)"
-    return changed, [Finding("E26", "info", text)]
+    if not any(_WAS_UTC.search(f.message) for f in recording.meta.findings):
+        changed = _with_times(recording, lambda label, _: label + weeks * WEEK_NS)
+        return changed, [Finding("E26", "info", text)]
+
+    def convert(label_ns: Ints, _: list[int]) -> Ints:
+        utc = gps_to_utc(label_ns.view("M8[ns]"))
+        return utc_to_gps(utc + np.timedelta64(weeks * WEEK_NS, "ns")).astype(np.int64)
+
+    changed = _with_times(recording, convert)
+    if not len(recording):
+        return changed, [Finding("E26", "info", text)]
+    before, after = (int(gpst_minus_utc_s(gps_to_utc(r.time[:1]))[0]) for r in (recording, changed))
+    evidence = (
+        f"the stamps were UTC: GPST - UTC is {after} s on the new date, was {before} s on the old; "
+        f"{after - before:+d} s beside the weeks"
+    )
+    changed = changed.replace(meta=replace(changed.meta, leap_seconds=after))
+    return changed, [Finding("E26", "info", text, evidence=evidence)]
 
 
 def shifted(recording: Recording, shift_s: float) -> Repaired:
@@ -78,8 +110,13 @@ def unwrapped(recording: Recording, period: str) -> Repaired:
     return changed, [Finding("E26", "info", text)]
 
 
-def without_leap_steps(recording: Recording, _: str) -> Repaired:
-    """Times before each step that E11 found moved so that the step is one interval."""
+def without_leap_steps(recording: Recording, how: str) -> Repaired:
+    """Times on one side of each step that E11 found moved so that the step is one interval.
+
+    "fix" moves those before it, as a receiver knows the leap seconds better later; "fix-after"
+    those behind it.
+    """
+    late = how == "fix-after"
     steps = [step for step in _leap_steps(recording) if not step.inserted]
     if not steps:
         return recording, []
@@ -87,12 +124,18 @@ def without_leap_steps(recording: Recording, _: str) -> Repaired:
     def convert(label_ns: Ints, cuts: list[int]) -> Ints:
         moved = label_ns.copy()
         for step, cut in zip(steps, cuts, strict=True):
-            moved[:cut] += step.seconds * NS_PER_S
+            if late:
+                moved[cut:] -= step.seconds * NS_PER_S
+            else:
+                moved[:cut] += step.seconds * NS_PER_S
         return moved
 
     return _with_times(recording, convert, steps), [
         Finding(
             "E26", "info",
+            f"{counted(len(recording) - step.row, 'epoch')} from {stamp(step.after_ns)} on moved "
+            f"by {-step.seconds:+d} s (--leap-slip)"
+            if late else
             f"{counted(step.row, 'epoch')} before {stamp(step.after_ns)} moved by "
             f"{step.seconds:+d} s (--leap-slip)",
         )

@@ -19,6 +19,8 @@ from sbas.input_check.coordinates import UNITS_DEG, UNITS_M
 from sbas.recording import COLUMNS, PlKind, Recording
 from sbas.timescales import TimeScale
 
+KIND_WORDS = (", not those of DO-229", "not of SBAS (DO-229)")
+"""What readers say (E23) of levels by their kind."""
 NOTE = "repairs"
 """Key of `RecordingMeta.options` under which the repairs made are noted, as JSON."""
 
@@ -33,17 +35,19 @@ class Repairs:
         `km` of a length; `ddmm`, `1e-7 deg`, `1e-6 deg`, `mas`, `arcsec`, `rad` of an angle.
     angles : "rad": latitude and longitude are radians.
     swap_latlon : latitude and longitude stand in each other's columns.
-    sign : "lat" or "lon": that one has the wrong sign throughout.
+    sign : "lat", "lon" or "both": that one has the wrong sign throughout, after `swap_latlon`.
     height_offset_m : added to every height: a geoid undulation, an antenna height [m].
     time : scale that the stamps are in, though they were taken for GPS time.
     week_rollover : weeks added to every time, such as 1024.
     unwrap : "day" or "week": the date was not advanced where time falls back by one.
     leap_slip : "fix": before a step of whole seconds that the position does not make (E11),
         times are moved so that it becomes one interval; the stamps behind the step stand.
+        "fix-after": those before it stand.
     shift_s : added to every time [s].
     sort : put epochs in the order of their times (stable).
     duplicates : of successive epochs with the same time keep the first or the last.
     pl_zero : "missing": protection levels <= 0 become missing.
+    pl_sentinel : protection levels of this value stand for "none" and become missing [m].
     pl_frozen : "missing": protection levels that stand still while the geometry changes (E13).
     pl_kind : kind of the protection levels, by the receiver's documentation.
 
@@ -55,16 +59,17 @@ class Repairs:
     unit: Mapping[str, str] = field(default_factory=dict)
     angles: Literal["rad"] | None = None
     swap_latlon: bool = False
-    sign: Literal["lat", "lon"] | None = None
+    sign: Literal["lat", "lon", "both"] | None = None
     height_offset_m: float | None = None
     time: TimeScale | None = None
     week_rollover: int | None = None
     unwrap: Literal["day", "week"] | None = None
-    leap_slip: Literal["fix"] | None = None
+    leap_slip: Literal["fix", "fix-after"] | None = None
     shift_s: float | None = None
     sort: bool = False
     duplicates: Literal["first", "last"] | None = None
     pl_zero: Literal["missing"] | None = None
+    pl_sentinel: float | None = None
     pl_frozen: Literal["missing"] | None = None
     pl_kind: PlKind | None = None
 
@@ -85,7 +90,7 @@ class Repairs:
                     cure=f"--unit {column}=UNIT with one of {', '.join(known)}"
                     if known else "name a column in degrees or metres",
                 )  # fmt: skip
-        for name in ("height_offset_m", "shift_s"):
+        for name in ("height_offset_m", "shift_s", "pl_sentinel"):
             value = getattr(self, name)
             if value is not None and not abs(value) < 1e9:
                 raise InputError(f"{option_of(name)} cannot be {value}")
@@ -104,16 +109,17 @@ class Repairs:
             if name == "unit":
                 words += [f'--unit "{column}={unit}"' for column, unit in value.items()]
             else:
-                words.append(option_of(name) + ("" if value is True else f" {value}"))
+                shown = f"{value:.15g}" if isinstance(value, float) else value
+                words.append(option_of(name) + ("" if value is True else f" {shown}"))
         return " ".join(words)
 
 
 _ALLOWED: dict[str, tuple[Any, ...]] = {
     "angles": ("rad",),
-    "sign": ("lat", "lon"),
+    "sign": ("lat", "lon", "both"),
     "time": get_args(TimeScale),
     "unwrap": ("day", "week"),
-    "leap_slip": ("fix",),
+    "leap_slip": ("fix", "fix-after"),
     "duplicates": ("first", "last"),
     "pl_zero": ("missing",),
     "pl_frozen": ("missing",),
@@ -203,7 +209,14 @@ def _set_kind(recording: Recording, kind: PlKind) -> tuple[Recording, list[Findi
     before = recording.meta.pl.kind
     if before == kind:
         return recording, []
-    meta = replace(recording.meta, pl=replace(recording.meta.pl, kind=kind))
+    pl = replace(recording.meta.pl, kind=kind)
+    # What the reader said of the levels by their kind would contradict what is now said of them.
+    kept = tuple(
+        f
+        for f in recording.meta.findings
+        if f.code != "E23" or not any(words in f.message for words in KIND_WORDS)
+    )
+    meta = replace(recording.meta, pl=pl, findings=kept)
     text = f"protection levels taken as {kind!r}, before as {before!r} (--pl-kind)"
     return recording.replace(meta=meta), [Finding("E26", "info", text)]
 
@@ -224,6 +237,7 @@ _STEPS: dict[str, _Step] = {
     "sort": repaired_times.sorted_epochs,
     "duplicates": repaired_epochs.without_repeated,
     "pl_zero": repaired_epochs.without_zero_levels,
+    "pl_sentinel": repaired_epochs.without_stand_ins,
     "pl_frozen": repaired_epochs.without_frozen_levels,
     "pl_kind": _set_kind,
 }

@@ -25,6 +25,7 @@ class SampledEpochs:
         self._seen = 0
         self._kept: list[NDArray[np.float64]] = []
         self._time: list[Ints] = []
+        self._row: list[Ints] = []
         self._size = 0
 
     def update(self, rows: Rows) -> None:
@@ -34,17 +35,24 @@ class SampledEpochs:
         self._seen += at.size
         at = at[first :: self.stride]
         self._time.append(rows.time_ns[at])
+        self._row.append(rows.first + at)
         self._kept.append(np.stack([rows.values[name][at] for name in self.COLUMNS]))
         self._size += at.size
         while self._size > MOST_SAMPLES:
-            time, kept = np.concatenate(self._time)[::2], np.concatenate(self._kept, axis=1)[:, ::2]
-            self._time, self._kept, self._size = [time], [kept], time.size
+            time, row = (np.concatenate(part)[::2] for part in (self._time, self._row))
+            kept = np.concatenate(self._kept, axis=1)[:, ::2]
+            self._time, self._row, self._kept, self._size = [time], [row], [kept], time.size
             self.stride *= 2
 
     @property
     def time_ns(self) -> Ints:
         """(m,) times of the sampled epochs [ns]."""
         return np.concatenate(self._time) if self._time else np.empty(0, np.int64)
+
+    @property
+    def row(self) -> Ints:
+        """(m,) rows of the sampled epochs."""
+        return np.concatenate(self._row) if self._row else np.empty(0, np.int64)
 
     def values(self) -> tuple[Floats, Floats, Floats, Floats]:
         """(m,) latitudes, longitudes, heights and horizontal levels of the sampled epochs."""

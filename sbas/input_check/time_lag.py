@@ -27,8 +27,13 @@ FAR_S = (*(h * 3600 for h in range(-14, 15) if h), -86_400, 86_400, -604_800, 60
 LEAST_WAY_M = 100.0
 """Way of the truth within `LARGEST_LAG_S` on both sides that makes an epoch one in motion."""
 LEAST_MOVING = 30
-LEAST_GAIN_M = 2.0
+LEAST_GAIN_M = 1.0
 """The best lag brings the positions nearer by this, and to half the distance."""
+LEAST_LAG_S = 0.15
+SPREADS = 3.0
+HPL_SHARE = 0.1
+"""A lag below 1 s counts by its way: what exceeds so many distances at the best lag, or this part
+of the protection level, makes events that the receiver has not."""
 POOR_FIT_M = 50.0
 _BLOCKS = 10
 _AGREEING = 0.7
@@ -46,6 +51,7 @@ class Lag:
     at_best_m: float
     block_range_s: tuple[float, float]
     moving: int
+    speed_mps: float
 
 
 class _Track:
@@ -79,6 +85,11 @@ class _Track:
             np.interp(time_s + d, self.time_s, self.way_m) for d in (-LARGEST_LAG_S, LARGEST_LAG_S)
         )
         return np.asarray(end - begin >= LEAST_WAY_M)
+
+    def speed_mps(self, time_s: Floats) -> float:
+        """Median speed over the seconds around the times."""
+        begin, end = (np.interp(time_s + d, self.time_s, self.way_m) for d in (-0.5, 0.5))
+        return float(np.median(end - begin))
 
 
 class _Epochs:
@@ -146,20 +157,29 @@ def _search(pair: Comparison, track: _Track, order: Ints, base_s: int) -> Lag | 
     if np.isnan(typical).all():
         return None
     whole = int(lags[np.nanargmin(typical)])
-    fine = [base_s + whole + tenth / 10 for tenth in range(-10, 11)]
-    fitted = [_typical(epochs.distance_m(track, lag)) for lag in fine]
+    fine = base_s + whole + np.arange(-10, 11) / 10
+    near = np.stack([epochs.distance_m(track, lag) for lag in fine.tolist()])
+    fitted = [_typical(row) for row in near]
     i = int(np.nanargmin(fitted))
+    lag_s = round(float(fine[i]), 1)
+    if abs(lag_s) < 1:  # Whole seconds would agree on no lag at all.
+        blocks = _block_lags(near, fine, lag_s, 0.35)
+    else:
+        blocks = _block_lags(distance, base_s + lags, base_s + whole, 1.0)
     return Lag(
-        fine[i],
+        lag_s,
         _typical(epochs.distance_m(track, 0)) if base_s else float(typical[LARGEST_LAG_S]),
         fitted[i],
-        _block_lags(distance, base_s + lags, base_s + whole),
+        blocks,
         rows.size,
+        track.speed_mps(epochs.time_s + lag_s),
     )
 
 
-def _block_lags(distance: Floats, lags_s: Ints, whole_s: int) -> tuple[float, float]:
-    """Range of the best whole lags of most blocks of time; endless where they do not agree."""
+def _block_lags(
+    distance: Floats, lags_s: Floats | Ints, best_s: float, within_s: float
+) -> tuple[float, float]:
+    """Range of the best lags of most blocks of time; endless where they do not agree."""
     blocks = [
         part for part in np.array_split(np.arange(distance.shape[1]), _BLOCKS)
         if part.size >= LEAST_MOVING // 3
@@ -171,10 +191,27 @@ def _block_lags(distance: Floats, lags_s: Ints, whole_s: int) -> tuple[float, fl
             medians = np.full(lags_s.size, np.inf)
             medians[some] = np.nanmedian(distance[some][:, part], axis=1)
             found.append(float(lags_s[np.argmin(medians)]))
-    agreeing = [lag for lag in found if abs(lag - whole_s) <= 1]
+    agreeing = [lag for lag in found if abs(lag - best_s) <= within_s]
     if len(found) < 3 or len(agreeing) < _AGREEING * len(found):
         return -np.inf, np.inf
     return min(agreeing), max(agreeing)
+
+
+def early_fits(pair: Comparison, row: Ints, first: int, last: int) -> bool:
+    """Whether epochs before row `first` fit a trajectory, and those from row `last` on do not.
+
+    Parameters
+    ----------
+    pair : sample and truth.
+    row : (m,) rows of the sample.
+    first, last : rows of the first and last corrected leap second.
+    """
+    east, north, _ = pair.errors_m()
+    apart, row = np.hypot(east, north), row[pair.covered]
+    early, late = apart[row < first], apart[row >= last]
+    if min(early.size, late.size) < LEAST_MOVING:
+        return False
+    return bool(np.median(early) + LEAST_GAIN_M < np.median(late) / 2)
 
 
 def time_lag(pair: Comparison) -> Iterator[Judged]:
@@ -197,7 +234,7 @@ def time_lag(pair: Comparison) -> Iterator[Judged]:
         gain >= LEAST_GAIN_M and lag.at_best_m <= 0.5 * lag.at_zero_m
     )
     blocks = lag.block_range_s
-    if not significant or not np.isfinite(blocks[0]) or abs(lag.lag_s) < 0.15:
+    if not significant or not np.isfinite(blocks[0]) or abs(lag.lag_s) < LEAST_LAG_S:
         return
     if not lag.at_best_m <= POOR_FIT_M:
         return
@@ -209,10 +246,17 @@ def time_lag(pair: Comparison) -> Iterator[Judged]:
         f"{blocks[1]:+g} s); GPST - UTC that day {leap} s"
     )
     if abs(lag.lag_s) < 1:
+        way_m = abs(lag.lag_s) * lag.speed_mps
+        hpl = pair.hpl_m[pair.hpl_m > 0]
+        hpl_m = float(np.median(hpl)) if hpl.size else float("nan")
+        matters = way_m > max(SPREADS * lag.at_best_m, 1.0) or way_m > HPL_SHARE * hpl_m
         yield judged(
-            "E02", "info", f"positions fit the truth best {lag.lag_s:+.1f} s later",
-            evidence=evidence,
-            cure="compare the latency of both; --shift-s where the recording's stamps are late",
+            "E02", "error" if matters else "warning",
+            f"positions fit the truth best {lag.lag_s:+.1f} s later",
+            evidence=f"{evidence}; {way_m:.3g} m at the median speed of {lag.speed_mps:.3g} m/s"
+            + (f", HPL median {hpl_m:.4g} m" if hpl.size else ""),
+            cure=f"--shift-s {lag.lag_s:g}, where the recording's stamps are off (its latency); "
+            "else correct the truth's times, or the place on the vehicle that it is of",
         )  # fmt: skip
         return
     cure, repair = _cure(lag.lag_s, leap)
@@ -234,7 +278,10 @@ def _cure(lag_s: float, leap: int) -> tuple[str, dict[str, object]]:
     if abs(lag_s - leap) <= 0.3:
         return f"--time UTC, if the recording's stamps are UTC; else {truth}", {"time": "UTC"}
     if abs(lag_s + leap) <= 0.3:
-        return f"the truth's times seem to be UTC: {truth}; {shift} if they are not", {}
+        return (
+            f"--truth-time-scale UTC, as the truth's times seem to be UTC; {shift} where the "
+            "recording's are wrong"
+        ), {}
     if abs(lag_s - (leap - 10_800)) <= 0.3:
         return f"--time GLONASST, if the recording's stamps are; else {truth}", {}
     if abs(lag_s - 14) <= 0.3:

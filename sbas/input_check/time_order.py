@@ -149,16 +149,46 @@ def repeated(facts: Survey, slips: int, alternating: bool) -> Iterator[Judged]:
     )  # fmt: skip
 
 
+LEAST_STEPS = 60
+"""Equal steps one behind the other, from which longer ones are a rate and no gaps."""
+
+
 def rates(facts: Survey) -> Iterator[Judged]:
-    """E27: epochs that do not cover the time that their median step says."""
+    """E27: epochs that do not cover the time that their median step says, or slower stretches."""
     counted_ns = facts.epochs * facts.interval_ns
+    slower = _slower_steps(facts)
     if facts.interval_ns and abs(facts.covered_ns - counted_ns) > 0.01 * counted_ns:
-        yield judged(
-            "E27", "warning", "epochs come at more than one rate",
-            evidence=f"{facts.epochs:,} epochs cover {facts.covered_ns / NS_PER_S:.6g} s, at the "
-            f"median step they would cover {counted_ns / NS_PER_S:.6g} s",
-            cure="hours are counted by the time covered; evaluate each rate on its own",
-        )  # fmt: skip
+        evidence = (
+            f"{facts.epochs:,} epochs cover {facts.covered_ns / NS_PER_S:.6g} s, at the "
+            f"median step they would cover {counted_ns / NS_PER_S:.6g} s"
+        )
+    elif slower:
+        evidence = (
+            f"{slower[0]:,} steps of {slower[1] / NS_PER_S:.6g} s one behind the other, each "
+            f"counted as a gap beside the median step of {facts.interval_ns / NS_PER_S:.6g} s"
+        )
+    else:
+        return
+    yield judged(
+        "E27", "warning", "epochs come at more than one rate",
+        evidence=evidence,
+        cure="hours are counted by the time covered; evaluate each rate on its own",
+    )  # fmt: skip
+
+
+def _slower_steps(facts: Survey) -> tuple[int, int] | None:
+    """Count and length [ns] of the longest run of equal gaps without another step between."""
+    gaps = facts.gaps
+    if len(gaps) < LEAST_STEPS:
+        return None
+    step = gaps.after_ns - gaps.before_ns
+    same = (np.diff(gaps.row) == 1) & (np.abs(np.diff(step)) <= STAMP_TOLERANCE_NS)
+    edges = np.flatnonzero(np.diff(same, prepend=False, append=False))
+    length = edges[1::2] - edges[::2] + 1
+    if length.size == 0 or length.max() < LEAST_STEPS:
+        return None
+    longest = int(np.argmax(length))
+    return int(length[longest]), int(step[edges[2 * longest]])
 
 
 def lost(facts: Survey, slips: frozenset[int]) -> Iterator[Judged]:

@@ -200,10 +200,12 @@ def _own_median(checked: CheckResult) -> tuple[FixedPoint | None, Finding]:
     survey = checked.survey
     lat, lon, height = survey.median_position
     if not survey.static:
+        alone = "; without positions availability is that of the level alone"
         what = "has no positions" if survey.positions == 0 else f"moves ({survey.extent_m:.3g} m)"
         return None, Finding(
             "E01", "warning", f"no truth, and the recording {what}: no errors, no error rates",
-            evidence="protection levels and availability are given",
+            evidence="protection levels and availability are given"
+            + alone * (survey.positions == 0),
             cure="--truth LAT,LON,HEIGHT or --truth TRAJECTORY.csv",
         )  # fmt: skip
     point = FixedPoint(
@@ -315,6 +317,7 @@ def _remarks(
                 "E01",
                 "warning",
                 f"{covers if tally.positions else 'no epoch has a position'}: no error was formed",
+                evidence="availability is that of the level alone" * tally.level_alone,
                 cure="check the times and the steps of the trajectory" if tally.positions else "",
             )
         )

@@ -92,6 +92,8 @@ class PartTally:
 
     def __init__(self, survey: Survey, alert_limits_m: tuple[float, ...]) -> None:
         self.alert_limits_m = alert_limits_m
+        # Levels alone, without any position, are judged as levels.
+        self.level_alone = survey.positions == 0
         self.epochs = self.positions = self.judged = self.mi_epochs = self.levels_left_out = 0
         self.covered_ns = self.judged_ns = self.error_ns = self.level_ns = 0
         self.begin_ns: int | None = None
@@ -127,13 +129,13 @@ class PartTally:
         modes = np.bincount(values.modes % len(self.modes))
         for name, count in zip(self.modes, modes, strict=False):
             self.modes[name] += int(count)
-        fix = values.fix
+        fix = values.fix | self.level_alone
         self.levels.update(time_ns, np.where(fix, hpl, np.nan), values.modes)
         self._level_counts += np.bincount(
             np.searchsorted(LEVEL_GRID_M, hpl[fix & np.isfinite(hpl)], side="right"),
             minlength=self._level_counts.size,
         )
-        self.positions += int(fix.sum())
+        self.positions += int(values.fix.sum())
         for al in self.alert_limits_m:
             self.down_ns[al] += int(covers[values.down[al]].sum())
         self.level_ns += int(covers[np.isfinite(hpl)].sum())
@@ -196,7 +198,7 @@ class PartTally:
         self.stanford += other.stanford
 
     def levels_below(self) -> Ints:
-        """(g,) epochs with a fix and HPL below each limit of LEVEL_GRID_M."""
+        """(g,) epochs with a fix (`level_alone`: any) and HPL below each limit of LEVEL_GRID_M."""
         return np.cumsum(self._level_counts)[:-1]
 
     def ratio_exceeded(self) -> Floats:

@@ -136,7 +136,9 @@ class RecordTally:
             hdop=batch["hdop"].to_numpy(),
             sigma_h_m=major_semi_axis_m(*sigmas),
             # Written so that a missing level or fix is down.
-            down={al: ~(fix & (usable < al)) for al in self.alert_limits_m},
+            down={
+                al: ~((fix | self.all.level_alone) & (usable < al)) for al in self.alert_limits_m
+            },
             judged=known if errors is None else known & np.isfinite(errors.hpe_m),
             errors=errors,
         )

@@ -11,7 +11,14 @@ import pandas as pd
 from pandas.api.types import union_categoricals
 
 from sbas.findings import Finding
-from sbas.recording import COLUMNS, EpochSource, Recording, RecordingMeta, with_columns
+from sbas.recording import (
+    COLUMNS,
+    EpochSource,
+    ProtectionLevelMeta,
+    Recording,
+    RecordingMeta,
+    with_columns,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +100,10 @@ def _meta(parts: Sequence[_Part]) -> RecordingMeta:
 
 
 _SAME = ("receiver", "frame", "height_reference", "antenna")
+_IN_WORDS = {
+    **{name: name.replace("_", " ") for name in _SAME},
+    "pl": "protection levels",
+}
 
 
 def _differences(parts: Sequence[_Part]) -> Iterator[Finding]:
@@ -116,11 +127,12 @@ def _differences(parts: Sequence[_Part]) -> Iterator[Finding]:
     for name in names:
         values = [getattr(meta, name) for meta in metas]
         if any(value != values[0] for value in values):
-            different = dict.fromkeys(str(value) or "not stated" for value in values)
+            words = map(_levels_in_words if name == "pl" else str, values)
+            different = dict.fromkeys(word or "not stated" for word in words)
             yield Finding(
                 "E06",
                 "error",
-                f"the files differ in their {name}: one recording is of one receiver",
+                f"the files differ in their {_IN_WORDS[name]}: one recording is of one receiver",
                 evidence="; ".join(list(different)[:3]),
                 cure="evaluate them apart, or --accept E06 where it is the same receiver",
             )
@@ -135,6 +147,12 @@ def never_pooled(metas: Iterable[RecordingMeta]) -> bool:
     kinds = {pl.kind for pl in levels}
     risks = {(pl.risk, pl.risk_per) for pl in levels if pl.risk is not None}
     return len(risks) > 1 or len(kinds - {"unknown"}) > 1 or ("tmir" in kinds and len(kinds) > 1)
+
+
+def _levels_in_words(pl: ProtectionLevelMeta) -> str:
+    factors = [("K_H", pl.k_h), ("K_V", pl.k_v)]
+    known = [f"{name} {k:g}" for name, k in factors if k is not None]
+    return f"kind {pl.kind}, {' and '.join(known) or 'K not stated'}"
 
 
 def _risk(meta: RecordingMeta) -> str:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import bz2
 import lzma
+import os
 import re
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO, NoReturn, Protocol
@@ -29,6 +30,7 @@ FREE_BYTES = 64 << 20
 
 HEAD_BYTES = 512
 _IN_BYTES, _OUT_BYTES = 1 << 18, 4 << 20
+_DEFLATE_TIMES = 1032  # no deflate stream becomes more (zlib, Technical Details)
 _XZ_MEMORY = 256 << 20  # xz -9 needs 65 MiB
 _MAGIC = (
     # Three bytes at least, so that binary logs do not begin so by chance.
@@ -170,7 +172,7 @@ def _findings(packing: str, path: Path) -> tuple[Finding, ...]:
         Finding(
             "E10",
             "warning",
-            "a .Z file has neither length nor checksum: one that was cut looks whole",
+            "a .Z file has neither length nor checksum: one that was cut or damaged looks whole",
             where=str(path),
             cure="compare the last epoch with when the recording ended; pack with gzip instead",
         ),
@@ -211,7 +213,7 @@ class _Sink:
             evidence=f"{size:,} bytes or more from {file_bytes:,}; the bound is {self.limit:,} "
             f"({MOST_BYTES >> 30} GiB, and {MOST_TIMES} times the file above "
             f"{FREE_BYTES >> 20} MiB, unless stated)",
-            cure=f"--max-output {2 * size} where you trust the file",
+            cure=_limit_cure(self.path, self.packing, size),
         )
 
     def refuse_damage(self, position: int, reason: str) -> NoReturn:
@@ -225,6 +227,61 @@ class _Sink:
             cure="copy the file again; or save what is sound before the damage, and give that: "
             + by_hand,
         )
+
+
+def _limit_cure(path: Path, packing: str, least: int) -> str:
+    """`--max-output` with what will do where that is known, of a file of `least` bytes or more."""
+    size, file_bytes = 0, path.stat().st_size
+    if packing == "zip":
+        size = least  # as the archive's directory states it
+    elif packing == "gzip":
+        with open(path, "rb") as file:
+            file.seek(-4, os.SEEK_END)
+            size = int.from_bytes(file.read(4), "little")
+        # The trailer is of the last member, and modulo 4 GiB.
+        size += (1 << 32) * max(-(-(least - size) // (1 << 32)), 0)
+        size = min(size, _DEFLATE_TIMES * file_bytes)
+    elif packing == "xz":
+        size = _xz_size(path)
+    if size >= least:
+        return f"--max-output {size} where you trust the file"
+    return (
+        f"--max-output {4 * least} where you trust the file; its size is not known before it is "
+        "unpacked: raise that until it is read"
+    )
+
+
+def _xz_size(path: Path) -> int:
+    """Bytes that the index of an xz file of one stream states; 0 where it cannot be read.
+
+    Source: The .xz File Format 1.2.1, sections 1.2, 2.1.2 and 4.
+    """
+    with open(path, "rb") as file:
+        file.seek(0, os.SEEK_END)
+        end = file.tell()
+        file.seek(max(end - 12, 0))
+        footer = file.read(12)
+        index_bytes = 4 * (int.from_bytes(footer[4:8], "little") + 1)
+        if footer[10:] != b"YZ" or index_bytes + 24 > end or index_bytes > FREE_BYTES:
+            return 0
+        file.seek(end - 12 - index_bytes)
+        index = file.read(index_bytes)
+    numbers = _varints(index[1:-4])
+    try:
+        blocks = [(next(numbers), next(numbers)) for _ in range(next(numbers))]
+    except StopIteration:
+        return 0
+    return sum(size for _, size in blocks) if index[0] == 0 else 0
+
+
+def _varints(data: bytes) -> Iterator[int]:
+    value = shift = 0
+    for byte in data:
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if not byte & 0x80:
+            yield value
+            value = shift = 0
 
 
 class _Decoder(Protocol):

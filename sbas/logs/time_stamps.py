@@ -26,6 +26,7 @@ from sbas.timescales import (
 
 DAY_NS = 86_400 * NS_PER_S
 JST_MINUS_UTC_NS = 9 * 3600 * NS_PER_S
+_AHEAD_OF_UTC_NS = {"UTC": 0, "JST": JST_MINUS_UTC_NS, "GLONASST": 3 * 3600 * NS_PER_S}
 _GPS_FIRST_DAY = 3657  # 1980-01-06 in days since 1970
 _LONGEST = 48  # characters of a stamp
 _LAST_YEAR = 2261  # the last whole year of datetime64[ns]
@@ -157,11 +158,10 @@ def stamps_to_gps(
     ns = stamps.ns
     if scale == "GPST" or not len(ns):
         return ns.astype("M8[ns]"), None, ()
-    utc_ns = {"UTC": 0, "JST": JST_MINUS_UTC_NS, "GLONASST": 3 * 3600 * NS_PER_S}
     leap_seconds = None
     findings = []
-    if scale in utc_ns:
-        utc = (ns - utc_ns[scale]).astype("M8[ns]")
+    if scale in _AHEAD_OF_UTC_NS:
+        utc = (ns - _AHEAD_OF_UTC_NS[scale]).astype("M8[ns]")
         times = to_gps(utc, "UTC") + stamps.leap * np.timedelta64(1, "s")
         steps = gpst_minus_utc_s(np.array([utc.min(), utc.max(), utc[0]]))
         leap_seconds = int(steps[2])
@@ -187,6 +187,36 @@ def stamps_to_gps(
         ),
     )
     return times, leap_seconds, tuple(findings)
+
+
+def counts_leap_seconds(scale: str) -> bool:
+    """Whether a stamp hh:mm:60 can stand on the scale."""
+    return scale in _AHEAD_OF_UTC_NS
+
+
+def leap_stamps_of_utc(stamps: Stamps) -> NDArray[np.bool_]:
+    """(n,) stamps of a second 60 where UTC had a leap second: no other scale has them."""
+    before = np.where(stamps.leap, stamps.ns, 2 * _GPS_FIRST_DAY * DAY_NS)
+    before -= before % NS_PER_S
+    following = (before + NS_PER_S).astype("M8[ns]")
+    inserted = gpst_minus_utc_s(following) > gpst_minus_utc_s(before.astype("M8[ns]"))
+    return np.asarray(stamps.leap & inserted)
+
+
+def leap_stamp_finding(count: int, scale: str) -> tuple[Finding, ...]:
+    """E02 for `count` stamps of a leap second of UTC in a file taken as another scale."""
+    if not count:
+        return ()
+    return (
+        Finding(
+            "E02",
+            "error",
+            f"stamps of a leap second, which UTC has and {scale} has not: the times are UTC",
+            evidence=f"{count:,} times with a second 60; as {scale} all are 18 s off, and those "
+            "are left out",
+            cure="--time-scale UTC",
+        ),
+    )
 
 
 def _unreadable(rows: int) -> Stamps:

@@ -23,10 +23,12 @@ MOST_BYTES = 64 << 20
 
 _LINES = ("LineString", "MultiLineString")
 _DEGREES = {("OGC", "CRS84"): "", ("EPSG", "4326"): "", ("EPSG", "4258"): "ETRS89"}
-_HEIGHT_CURE = (
-    "say height='ellipsoidal', height='geoid' with geoid= the undulation in metres, or "
-    "height='ignore' (--track-height)"
-)
+_HEIGHT_CURES = {
+    "": "--track-height ellipsoidal, --track-height geoid with --truth-geoid UNDULATION in "
+    "metres, or --track-height ignore",
+    "geoid": "--truth-geoid UNDULATION in metres (about 45 in Central Europe), or --track-height "
+    "ignore",
+}
 
 HeightKind = Literal["ellipsoidal", "geoid", "ignore"]
 
@@ -159,7 +161,7 @@ def _line(
             + ("" if track_id is None else f" with track_id {track_id!r}"),
             where=where,
             evidence=f"track_id of its lines: {', '.join(names)[:200]}" if names else "",
-            cure="name one with track_id= (--track-id); one track in parts is a MultiLineString",
+            cure="name one with --track-id; one track in parts is a MultiLineString",
         )
     return lines[0]
 
@@ -216,7 +218,7 @@ def _with_heights(
             where=where,
             evidence=f"first height {parts[0][0, 2]:.3f} m; geoid and ellipsoid part by 45 m in "
             "Central Europe",
-            cure=_HEIGHT_CURE,
+            cure=_HEIGHT_CURES["geoid" if kind == "geoid" else ""],
         )
     return [part + np.array([0.0, 0.0, shift[kind]]) for part in parts]
 

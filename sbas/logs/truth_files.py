@@ -40,8 +40,8 @@ def read_truth_table(
     ----------
     path : CSV or Parquet with time, latitude, longitude and height, in any spelling that the
         alias map of delimited text knows; optional `sigma_h_m`, `sigma_v_m`, `heading_deg`.
-    time_scale : scale of the times where the file does not say it; needed for Parquet without
-        metadata of sbas.
+    time_scale : scale of the times, which goes before what a header says; needed for Parquet
+        without metadata of sbas.
     geoid : undulation [m], added where the file says that its heights are above the geoid.
     frame : projection such as "EPSG:25833", for a file with `easting_m` and `northing_m`.
 
@@ -49,7 +49,8 @@ def read_truth_table(
     -------
     Table indexed by `time` (GPS time), float64 columns `lat_deg`, `lon_deg`, `height_m`, and
     the optional ones that the file has; rows in file order. Of projected coordinates, latitude
-    and longitude in the datum of the projection.
+    and longitude in the datum of the projection. Where `time_scale` contradicts the header, the
+    warning that a recording carries is in `attrs["findings"]`, as a dict.
 
     Raises
     ------
@@ -66,12 +67,13 @@ def read_truth_table(
         is_parquet = stream.read(4) == b"PAR1"
     columns = (*POSITION, *TRUTH_COLUMNS, *PROJECTED)
     if not is_parquet:
-        mapped = delimited_text.read_mapped(file, columns=columns, extra=TRUTH_COLUMNS, geoid=geoid)
-        if time_scale not in (None, mapped.time_scale) and "time_scale" in mapped.options:
-            # Neither header nor times named a scale.
+        try:
             mapped = delimited_text.read_mapped(
                 file, columns=columns, extra=TRUTH_COLUMNS, time_scale=time_scale, geoid=geoid
             )
+        except InputError as error:
+            error.cure = _of_truth(error.cure)
+            raise
         return _checked(mapped, frame, str(path))
     with opened(file) as parquet:
         if META_KEY not in (parquet.schema_arrow.metadata or {}):
@@ -93,11 +95,20 @@ def _foreign(
         raise InputError(
             "the truth does not say in which time scale its times are",
             where=str(file),
-            cure="say time_scale='GPST' or 'UTC'; 18 s are 700 m at 140 km/h",
+            cure="--truth-time-scale UTC or --truth-time-scale GPST; 18 s are 700 m at 140 km/h",
         )
     return map_foreign(
         parquet, file, columns=columns, extra=TRUTH_COLUMNS, time_scale=time_scale, geoid=geoid
     )
+
+
+def _of_truth(cure: str) -> str:
+    """A cure for recordings in the options of the truth, which are fewer."""
+    if any(option in cure for option in ("--decimal", "--encoding", "--max-line", "--mode-map")):
+        return "write it as UTF-8, with decimal points and a line for each epoch"
+    for option in ("--time-scale", "--geoid"):
+        cure = cure.replace(option, f"--truth-{option.removeprefix('--')}")
+    return cure
 
 
 def _checked(mapped: MappedTable, frame: str, where: str) -> pd.DataFrame:
@@ -112,18 +123,22 @@ def _checked(mapped: MappedTable, frame: str, where: str) -> pd.DataFrame:
             cure="name the columns time, lat_deg, lon_deg, height_m (or easting_m, northing_m)",
         )
     # Decimal commas are read without doubt or refused; an undulation that no height needs is
-    # there for the recording.
+    # there for the track.
+    told = [f for f in mapped.findings if f.code == "E26" and f.severity == "warning"]
     odd = [
         finding
         for finding in mapped.findings
-        if finding.severity != "info" and finding.code != "E20" and finding != geoid_unused()
+        if finding.severity != "info"
+        and finding.code != "E20"
+        and finding != geoid_unused()
+        and finding not in told
     ]
     if odd:
         raise InputError(
             f"the truth is not clean: {odd[0].message}",
             where=where,
             evidence=odd[0].evidence,
-            cure=odd[0].cure or "correct the file",
+            cure=_of_truth(odd[0].cure) or "correct the file",
         )
     table = mapped.table[[n for n in (*needed, *TRUTH_COLUMNS) if n in mapped.table]]
     incomplete = table[list(needed)].isna().any(axis=1)
@@ -137,7 +152,10 @@ def _checked(mapped: MappedTable, frame: str, where: str) -> pd.DataFrame:
         )
     if projected:
         table = _unprojected(table, frame, where)
-    return table.astype("f8")
+    table = table.astype("f8")
+    if told:
+        table.attrs["findings"] = [finding.to_dict() for finding in told]
+    return table
 
 
 def _unprojected(table: pd.DataFrame, frame: str, where: str) -> pd.DataFrame:

@@ -88,6 +88,16 @@ def _of_messages(timeline: CorrectionTimeline, heard: SbasMessages) -> Iterator[
             f"{timeline.alarms_ignored:,} messages of type 0 were not taken as alarms: the signal "
             "is in test mode, and so is every figure",
         )
+    if timeline.contradicted_s.size:
+        yield Finding(
+            "E24",
+            "warning",
+            f"{timeline.contradicted_s.size:,} masks came with the issue of another content: all "
+            "that was heard before them is void",
+            evidence=f"first at GPS second {int(timeline.contradicted_s[0])}; a gap of hours, or "
+            "messages of two days or satellites joined",
+            cure="give messages of one time without long gaps",
+        )
     if timeline.void:
         listed = ", ".join(f"type {kind}: {n:,}" for kind, n in sorted(timeline.void.items()))
         yield Finding(

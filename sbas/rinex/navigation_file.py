@@ -209,6 +209,13 @@ _KEPLER_ORDER = (
 )  # fmt: skip
 _MAY_BE_BLANK = {"source", "week", "l2p", "ura_m", "iodc", "transmission", "fit_h"}
 _WHOLE = {"prn", "iode", "iodc", "health", "source", "iodn"}
+_MOST = {
+    "crs_m": 1024.0, "crc_m": 1024.0, "cuc": 6.11e-5, "cus": 6.11e-5, "cic": 6.11e-5,
+    "cis": 6.11e-5, "delta_n": 1.18e-8, "idot": 2.94e-9, "omega_dot": 3.0e-6, "m0": 3.15,
+    "omega": 3.15, "omega0": 3.15, "i0": 3.15,
+}  # fmt: skip
+"""Largest numbers that the fields of a broadcast message can hold (IS-GPS-200, table 20-III; the
+Galileo OS SIS ICD, table 60, has the same fields): beyond them a digit was lost."""
 _SQRT_A = (2530.0, 8192.0)
 _MOST_ECCENTRICITY = 0.5
 """Ranges of what the messages can hold (IS-GPS-200, table 20-III; Galileo OS SIS ICD, table 43)."""
@@ -232,6 +239,7 @@ def _kepler_row(record: Record) -> dict[str, float] | None:
         and 0 <= values["toe"] <= _MOST_TOE_S
         and all(abs(values[name]) < _MOST_WHOLE for name in _WHOLE & values.keys())
         and record.prn > 0
+        and all(abs(values[name]) <= most for name, most in _MOST.items())
     )
     if not possible:
         return None

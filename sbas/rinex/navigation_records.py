@@ -182,10 +182,11 @@ def _records_3(lines: Sequence[str], seen: Seen, open_line: str | None) -> Itera
         system = head[0]
         if system in LINES and (wanted is None or set(wanted) & set(_MESSAGES[system])):
             record = None
-            if head[1:3].strip().isdigit() and end - at == LINES[system] + 1:
+            number = head[1:3].replace(" ", "0")
+            if number.isascii() and number.isdecimal() and end - at == LINES[system] + 1:
                 calendar = (head[4:8], head[9:11], head[12:14], head[15:17], head[18:20],
                             head[21:23])  # fmt: skip
-                prn = int(head[1:3]) + (100 if system == "S" else 0)
+                prn = int(number) + (100 if system == "S" else 0)
                 record = _record(
                     system, prn, calendar, lines[at:end], (_FIRST_3, _OTHER_3), width, open_line
                 )

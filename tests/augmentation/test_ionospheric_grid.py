@@ -107,10 +107,11 @@ def test_a_band_of_the_old_issue_serves_until_its_own_new_mask_comes() -> None:
     assert raw_at(line, 5, 51, 59, 61, band=4) == [10, 10, None]
 
 
-def test_the_same_issue_does_not_change_its_content() -> None:
+def test_another_content_under_the_same_issue_voids_what_was_before() -> None:
     line = timeline({0: mask(1, 5), 1: delays(1, 10), 50: mask(1, 6), 60: delays(1, 20)})
-    assert raw_at(line, 5, 49, 61) == [10, 20]
-    assert raw_at(line, 6, 61) == [None]
+    assert raw_at(line, 5, 49, 61) == [10, None]
+    assert raw_at(line, 6, 61) == [20]
+    assert line.contradicted_s.size == 1
 
 
 @pytest.mark.parametrize("needs_data", [False, True])

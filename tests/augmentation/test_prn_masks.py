@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from sbas.augmentation.prn_masks import latest_of_slot
 from sbas.augmentation.timeline import CorrectionTimeline, correction_timeline
@@ -30,16 +31,33 @@ def test_the_mask_before_serves_until_600_s_after_it_was_last_sent() -> None:
 
 
 def test_a_mask_that_comes_again_renews_the_time_alone() -> None:
-    line = timeline((0, enc.mask(0, A)), (500, enc.mask(0, B)), (900, enc.mask(0, A)))
+    line = timeline((0, enc.mask(0, A)), (500, enc.mask(0, A)), (900, enc.mask(0, A)))
     assert line.masks.time_s.size == 1
+    assert line.contradicted_s.size == 0
     assert line.masks.position_of[0, 9] == 2
     assert line.masks.position_of[0, 7] == -1
     instants = line.reception.instants(enc.epochs_ns(600.13, 1100, 1100.13, 1500, 1500.13))
     assert line.masks.expired(instants).tolist() == [False, False, False, False, True]
 
 
-def test_three_issues_follow_each_other() -> None:
+@pytest.mark.parametrize("gap_s", [30, 700, 1300])
+def test_another_content_under_the_same_issue_voids_what_was_before(gap_s: int) -> None:
+    line = timeline((0, enc.mask(0, A)), (gap_s, enc.mask(0, B)))
+    assert (line.contradicted_s - enc.START_S).tolist() == [gap_s]
+    # Nothing serves in the second in which the message is on its way.
+    assert current_and_previous(line, gap_s - 1, gap_s, gap_s + 1) == [(0, -1), (-1, -1), (1, -1)]
+    assert line.masks.position_of[1, 7] != line.masks.position_of[0, 7]
+
+
+def test_an_issue_that_comes_round_within_the_life_of_its_data_is_a_contradiction() -> None:
     line = timeline((0, enc.mask(3, A)), (10, enc.mask(0, B)), (20, enc.mask(3, C)))
+    assert current_and_previous(line, 1, 11, 21) == [(0, -1), (1, 0), (2, -1)]
+    later = timeline((0, enc.mask(3, A)), (10, enc.mask(0, B)), (971, enc.mask(3, C)))
+    assert later.contradicted_s.size == 0
+
+
+def test_three_issues_follow_each_other() -> None:
+    line = timeline((0, enc.mask(3, A)), (10, enc.mask(0, B)), (20, enc.mask(1, C)))
     assert current_and_previous(line, 1, 11, 21) == [(0, -1), (1, 0), (2, 1)]
     assert line.masks.position_of[2, 8] == 1
 

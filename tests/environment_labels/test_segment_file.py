@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -42,6 +43,15 @@ def test_utc_becomes_gps_time(tmp_path: Path) -> None:
     assert segment.end == np.datetime64("2026-11-22T06:10:18")
 
 
+@pytest.mark.parametrize("scale", ["GPST", "UTC"])
+def test_a_zone_decides_for_itself(tmp_path: Path, scale: Literal["GPST", "UTC"]) -> None:
+    file = written(tmp_path, "label,begin,end\nopen,2026-11-22T06:00:00Z,2026-11-22T06:10:00Z\n")
+    segment = load_segments(file, time_scale=scale).segments[0]
+    assert isinstance(segment, TimeSegment)
+    assert segment.begin == np.datetime64("2026-11-22T06:00:18")
+    assert segment.end == np.datetime64("2026-11-22T06:10:18")
+
+
 def test_by_distance_with_and_without_a_track(tmp_path: Path) -> None:
     file = written(tmp_path, "label,from_m,to_m\nopen,-10.5,1e3\n")
     assert load_segments(file).segments == (TrackSegment(-10.5, 1000.0, "open"),)
@@ -68,7 +78,8 @@ def test_by_distance_with_and_without_a_track(tmp_path: Path) -> None:
         ("label,begin,end\na,2026-11-22T06:00,22.11.2026\n", "no time: '22.11.2026'", 2),
         ("label,begin,end\na,2026-11-22T06:00,2026-13-22T06:00\n", "no time", 2),
         ("label,begin,end\na,2026-11-22T06:00,2026-11-22T06:00:60\n", "no time", 2),
-        ("label,begin,end\na,2026-11-22T06:00Z,2026-11-22T07:00\n", "marked as UTC", 2),
+        ("label,begin,end\na,2026-11-22T06:00Z,2026-11-22T07:00\n", "marked as UTC, and others", 2),
+        ("label,begin,end\na,2026-11-22T06:00+02:00,2026-11-22T07:00\n", "offset from UTC", 2),
         ('label,from_m,to_m\n"a"b,0,1\n', "no CSV", 2),
     ],
 )

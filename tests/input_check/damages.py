@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from sbas.findings import Severity
-from sbas.recording import MODES, ProtectionLevelMeta, Recording, mode_categories
+from sbas.recording import MODES, Flag, ProtectionLevelMeta, Recording, mode_categories
 from sbas.timescales import gps_to_utc
 from sbas.truth import Truth
 from tests.input_check.journeys import (
@@ -64,6 +64,24 @@ def _slipped(recording: Recording, row: int, k: float) -> Recording:
     return timed(recording, time)
 
 
+def _in_turn(
+    recording: Recording, north_m: float, level: float, *, n_sv: int = 0, sigma_m: float = 0.7
+) -> Recording:
+    """Every second epoch of a receiver that stands aside, with another level; both noisy."""
+    n = len(recording)
+    other = np.arange(n) % 2 == 1
+    rng = np.random.default_rng(4)
+    noise = rng.normal(0, sigma_m, (2, n)) / 111_195
+    t = recording.table
+    return changed(
+        recording,
+        lat_deg=t["lat_deg"] + noise[0] + other * north_m / 111_195,
+        lon_deg=t["lon_deg"] + noise[1],
+        hpl_m=t["hpl_m"] * np.where(other, level, 1.0) * rng.normal(1, 0.02, n),
+        n_sv=(t["n_sv"] + other * n_sv).astype("i2"),
+    )
+
+
 def _over_a_leap_second() -> tuple[Recording, Recording]:
     """A record over the leap second of 2016-12-31, in GPS time and with its UTC stamps."""
     good = standing(600)
@@ -93,6 +111,8 @@ def damages() -> tuple[Damage, ...]:
     after = moved(other, n + 3600)
     apart = moved(receiver(np.full(n, 40.0), np.zeros(n), np.arange(n) * 1.0, 9), n + 3600)
     apart = changed(apart, hpl_m=apart.table["hpl_m"] * 1.8)
+    fast = journey(n, step_s=0.5)[0]
+    two_files = roof.replace(meta=replace(roof.meta, sources=2 * roof.meta.sources))
     lat, lon = (roof.table[c].to_numpy() for c in ("lat_deg", "lon_deg"))
     ddmm = {c: 100 * np.floor(v) + 60 * (v - np.floor(v)) for c, v in
             (("lat_deg", lat), ("lon_deg", lon))}  # fmt: skip
@@ -109,7 +129,7 @@ def damages() -> tuple[Damage, ...]:
         Damage("old leap seconds", "E02", "error", train, moved(train, -2), track, {}),
         Damage("truth in UTC", "E02", "error", train, moved(train, 18), track, {}),
         Damage("a time zone", "E02", "error", train, moved(train, 7200), track, {}),
-        Damage("half a second late", "E02", "info", train, moved(train, 0.5), track, {}),
+        Damage("half a second late", "E02", "error", train, moved(train, 0.5), track, {}),
         Damage("radians", "E03", "error", roof,
                changed(roof, lat_deg=np.radians(lat), lon_deg=np.radians(lon)), None,
                {"angles": "rad"}),
@@ -124,6 +144,17 @@ def damages() -> tuple[Damage, ...]:
                       rows(roof, np.r_[101:n])), None, {}),
         Damage("two receivers in turn", "E06", "error", roof,
                rows(joined(roof, other), np.arange(2 * n).reshape(2, n).T.ravel()), None, {}),
+        Damage("two receivers in turn, moving, noisy", "E06", "error", fast,
+               _in_turn(fast, 5.0, 1.0), None, {}),
+        Damage("two receivers in turn at one place", "E06", "error", fast,
+               _in_turn(fast, 0.0, 1.2, n_sv=2), None, {}),
+        Damage("another country an hour later", "E06", "error", roof,
+               joined(roof, changed(moved(roof, n + 3600), lat_deg=lat - 20)), None, {}),
+        Damage("another country a second later", "E06", "error", roof,
+               joined(roof, changed(moved(roof, n), lat_deg=lat - 20)), None, {}),
+        Damage("another level in the next file", "E06", "warning", two_files,
+               changed(two_files, hpl_m=np.where(np.arange(n) < 600, 1, 1.8)
+                       * roof.table["hpl_m"]), None, {}),
         Damage("files of two receivers", "E06", "error", roof, joined(roof, after), None, {}),
         Damage("the receiver elsewhere", "E06", "warning", roof, joined(roof, apart), None, {}),
         Damage("degrees and minutes", "E08", "error", roof, changed(roof, **ddmm), None,
@@ -148,6 +179,15 @@ def damages() -> tuple[Damage, ...]:
         Damage("levels in km", "E08", "error", roof,
                changed(roof, hpl_m=roof.table["hpl_m"] / 1000, vpl_m=roof.table["vpl_m"] / 1000),
                None, {"unit": {"hpl_m": "km", "vpl_m": "km"}}),
+        Damage("only the horizontal level in km", "E08", "error", roof,
+               changed(roof, hpl_m=roof.table["hpl_m"] / 1000), None, {"unit": {"hpl_m": "km"}}),
+        Damage("only the vertical level in km", "E08", "error", roof,
+               changed(roof, vpl_m=roof.table["vpl_m"] / 1000), None, {"unit": {"vpl_m": "km"}}),
+        Damage("levels in cm, truth known", "E08", "warning", roof,
+               changed(roof, hpl_m=roof.table["hpl_m"] * 100), POINT, {}),
+        Damage("9999 for no level", "E07", "warning", roof,
+               changed(roof, hpl_m=np.where(np.arange(n) % 50, roof.table["hpl_m"], 9999.0)), None,
+               {"pl_sentinel": 9999.0}, restores=False),
         Damage("heights above the geoid", "E09", "warning", roof,
                changed(roof, height_m=roof.table["height_m"] - 44.5), POINT, {}),
         Damage("an antenna pole", "E09", "warning", (day_long := standing(20_000)),
@@ -169,6 +209,14 @@ def damages() -> tuple[Damage, ...]:
                {"sign": "lat"}),
         Damage("west for east, moving", "E12", "error", train,
                changed(train, lon_deg=-train.table["lon_deg"]), track, {"sign": "lon"}),
+        Damage("south and west for north and east", "E12", "error", roof,
+               changed(roof, lat_deg=-lat, lon_deg=-lon), POINT, {"sign": "both"}),
+        Damage("swapped, and south for north", "E12", "error", roof,
+               changed(roof, lat_deg=lon, lon_deg=-lat), POINT,
+               {"swap_latlon": True, "sign": "lat"}),
+        Damage("swapped, both signs, moving", "E12", "error", train,
+               changed(train, lat_deg=-train.table["lon_deg"], lon_deg=-train.table["lat_deg"]),
+               track, {"swap_latlon": True, "sign": "both"}),
         Damage("elsewhere", "E12", "error", roof, changed(roof, lat_deg=lat + 1), POINT, {}),
         Damage("levels of zero", "E13", "error", roof, changed(roof, hpl_m=zero), None,
                {"pl_zero": "missing"}, restores=False),
@@ -211,4 +259,11 @@ def damages() -> tuple[Damage, ...]:
                timed(roof, START + np.where(np.arange(n) < 800, np.arange(n) * 1000,
                                             800_000 + (np.arange(n) - 800) * 200)
                      .astype("m8[ms]")), None, {}),
+        Damage("two rates, the slower one rarer", "E27", "warning", roof,
+               timed(roof, START + np.where(np.arange(n) < 200, np.arange(n) * 1000,
+                                            200_000 + (np.arange(n) - 200) * 200)
+                     .astype("m8[ms]")), None, {}),
+        Damage("levels that the reader flagged", "E23", "warning", roof,
+               changed(roof, mode=mode_categories(np.full(n, MODES.index("standalone"))),
+                       flags=np.full(n, Flag.PL_OUTSIDE_SBAS, np.uint32)), None, {}),
     )  # fmt: skip

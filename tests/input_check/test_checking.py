@@ -21,7 +21,7 @@ from tests.input_check.damages import Damage, damages
 from tests.input_check.journeys import POINT, TODAY, checked, journey, said, standing
 
 DAMAGES = damages()
-ELSEWHERE = {"E01", "E07", "E10", "E16", "E17", "E18", "E19", "E20", "E21", "E24", "E25", "E26",
+ELSEWHERE = {"E01", "E10", "E16", "E17", "E18", "E19", "E20", "E21", "E24", "E25", "E26",
              "E28"}  # fmt: skip
 """Codes that readers, repairs, analyses and fault trees give."""
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sbas.input_check import fix, repair
 from sbas.input_check.leap_steps import MOST_SLOWING_MPS2, LeapSteps, _least_distance_m
 from sbas.recording import Recording
 from sbas.recording_survey import epoch_rows, sampling_interval_ns
 from tests.input_check.damages import rows, timed
-from tests.input_check.journeys import START, checked, journey, said, standing
+from tests.input_check.journeys import START, TODAY, checked, journey, said, standing
 
 
 def steps(recording: Recording) -> list[tuple[int, int]]:
@@ -36,8 +37,6 @@ def test_a_corrected_leap_second_is_found_wherever_there_is_speed(k: int) -> Non
 
 
 def test_two_corrections_are_both_found_and_both_fixed() -> None:
-    from sbas.input_check import repair
-
     train, _ = journey(600)
     time = train.time.copy()
     time[:100] -= np.timedelta64(2, "s")
@@ -94,3 +93,20 @@ def test_a_shuffled_recording_is_looked_at_without_a_word() -> None:
     order = np.random.default_rng(3).permutation(600)
     assert isinstance(steps(rows(journey(600)[0], order)), list)
     assert steps(timed(standing(4), START + np.array([0, 1, 3, 4]) * np.timedelta64(1, "s"))) == []
+
+
+@pytest.mark.parametrize("k", [18, -1, -3])
+@pytest.mark.parametrize(("early", "how"), [(True, "fix-after"), (False, "fix")])
+def test_the_side_that_fits_the_truth_stands(k: int, early: bool, how: str) -> None:
+    train, track = journey(900)
+    time = train.time.copy()
+    wrong = slice(600, None) if early else slice(None, 600)
+    time[wrong] += np.timedelta64(k if early else -k, "s")
+    slipped = timed(train, time)
+    result = checked(slipped, track)
+    assert said(result) == [("E11", "error")]
+    assert f"--leap-slip {how} " in result.findings[0].cure
+    assert result.repairs.named() == {"leap_slip": how}
+    fixed, after = fix(slipped, truth=track, today=TODAY)
+    assert (fixed.time == train.time).all()
+    assert [c for c, _ in said(after)] == ["E26"]

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+import sbas
 from sbas.exceptions import InputError
+from sbas.findings import Finding
 from sbas.input_check import Repairs, repair
-from sbas.recording import Recording, RecordingMeta
+from sbas.recording import Flag, ProtectionLevelMeta, Recording, RecordingMeta
 from sbas.timescales import gps_to_utc
 from tests.examples import quiet
 from tests.input_check.damages import rows, timed
@@ -22,6 +26,7 @@ ROOF = standing(50)
 @pytest.mark.parametrize(
     "asked",
     [{"unit": {"height_m": "mm"}}, {"angles": "rad"}, {"swap_latlon": True}, {"sign": "lon"},
+     {"sign": "both"},
      {"height_offset_m": 44.5}, {"time": "UTC"}, {"week_rollover": 1024}, {"shift_s": 0.5},
      {"pl_kind": "do229"}],
     ids=lambda asked: next(iter(asked)),
@@ -176,3 +181,69 @@ def test_glonass_time_is_three_hours_ahead_of_utc() -> None:
     """GLONASS ICD 3.3.3; GPST - UTC is 18 s in 2025."""
     cured = repair(ROOF, time="GLONASST")
     assert (START - cured.time[0]) / np.timedelta64(1, "s") == 3 * 3600 - 18
+
+
+def _of_utc(r: Recording) -> Recording:
+    """As a reader of UTC stamps hands it on: GPST - UTC of the date that they show."""
+    return repair(timed(r, gps_to_utc(r.time) - np.timedelta64(7168, "D")), time="UTC")
+
+
+def test_a_rollover_of_utc_stamps_takes_the_leap_seconds_of_the_right_date() -> None:
+    """IERS Bulletin C: GPST - UTC was 13 s on 2005-10-15, it is 18 s on 2025-06-01."""
+    frames = pd.DataFrame({"time": ROOF.time, "prn": 120})
+    rolled = _of_utc(ROOF)
+    rolled = rolled.replace(side_tables={"sbas_frames": frames.assign(time=rolled.time)})
+    fixed = repair(rolled, week_rollover=1024)
+    assert (fixed.time == ROOF.time).all()
+    assert (fixed.side_tables["sbas_frames"]["time"].to_numpy() == ROOF.time).all()
+    assert "+5 s beside the weeks" in fixed.meta.findings[-1].evidence
+    assert fixed.meta.leap_seconds == 18
+    both = timed(ROOF, gps_to_utc(ROOF.time) - np.timedelta64(7168, "D"))
+    assert (repair(both, time="UTC", week_rollover=1024).time == ROOF.time).all()
+    in_gps = timed(ROOF, ROOF.time - np.timedelta64(7168, "D"))
+    assert (repair(in_gps, week_rollover=1024).time == ROOF.time).all()
+
+
+def test_a_rollover_of_nmea_dates(tmp_path: Path) -> None:
+    """RMC dates 7168 days old: 12:59:40 UTC on 2025-05-23 is 12:59:58 GPST."""
+    lines = []
+    for k in range(5):
+        for body in (
+            f"GPGGA,1259{40 + k}.00,5001.80000,N,01546.20000,E,2,08,1.1,245.0,M,44.5,M,,",
+            f"GPRMC,1259{40 + k}.00,A,5001.80000,N,01546.20000,E,0.0,0.0,071005,,,D",
+        ):
+            check = 0
+            for letter in body.encode():
+                check ^= letter
+            lines.append(f"${body}*{check:02X}\r\n")
+    path = tmp_path / "rolled.nmea"
+    path.write_text("".join(lines), encoding="ascii")
+    fixed = repair(sbas.read(path), week_rollover=1024)
+    assert fixed.time[0] == np.datetime64("2025-05-23T12:59:58")
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["the levels are those of NAV-PL, not those of DO-229",
+     "the protection levels are those of the receiver's RAIM, not of SBAS (DO-229)"],
+)  # fmt: skip
+def test_what_rested_on_the_kind_falls_with_it(words: str) -> None:
+    of_kind, other = Finding("E23", "warning", words), Finding("E23", "warning", "others invalid")
+    stating = ROOF.with_findings(of_kind, other)
+    stating = stating.replace(meta=replace(stating.meta, pl=ProtectionLevelMeta("tmir")))
+    found = repair(stating, pl_kind="do229").meta.findings
+    assert of_kind not in found
+    assert other in found
+    assert [f.code for f in found] == ["E23", "E26"]
+
+
+def test_levels_that_stand_for_none_become_missing_and_flagged() -> None:
+    hpl = ROOF.table["hpl_m"].to_numpy().copy()
+    hpl[[4, 7]] = 9999.0
+    cured = repair(ROOF.replace(table=ROOF.table.assign(hpl_m=hpl)), pl_sentinel=9999.0)
+    assert np.flatnonzero(cured.table["hpl_m"].isna()).tolist() == [4, 7]
+    assert np.flatnonzero(
+        cured.table["flags"].to_numpy() & np.uint32(Flag.PL_SENTINEL)
+    ).tolist() == [4, 7]
+    assert cured.table["vpl_m"].notna().all()
+    assert repair(ROOF, pl_sentinel=9999.0) is ROOF

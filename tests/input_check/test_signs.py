@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from sbas.input_check import repair
+from sbas.input_check.against_truth import KNOW_GEOID
 from sbas.input_check.sampled_epochs import MOST_SAMPLES, SampledEpochs
+from sbas.logs.registry import formats
 from sbas.recording import MODES, mode_categories
 from sbas.recording_survey import Rows
 from tests.input_check.damages import changed, joined, rows, timed
@@ -111,8 +117,6 @@ def test_levels_of_other_modes_are_in_no_unit() -> None:
 
 
 def test_a_point_in_the_gulf_of_guinea_is_no_radian_when_the_truth_is_there() -> None:
-    from dataclasses import replace
-
     roof = standing()
     gulf = changed(roof, lat_deg=roof.table["lat_deg"] - 49.5, lon_deg=roof.table["lon_deg"] - 15)
     assert ("E03", "error") in said(checked(gulf))
@@ -142,3 +146,36 @@ def test_a_date_inside_the_day_after_tomorrow_is_no_future() -> None:
     assert said(checked(timed(roof, today + np.timedelta64(48, "h") + (roof.time - START)))) == [
         ("E22", "error")
     ]
+
+
+def test_the_geoid_cure_names_options_that_its_format_knows() -> None:
+    roof = standing()
+    low = changed(roof, height_m=roof.table["height_m"] - 44.5)
+    known = {
+        f.name for f in formats()
+        if f.name in KNOW_GEOID and "geoid" in inspect.signature(f.read).parameters
+    }  # fmt: skip
+    assert known == KNOW_GEOID
+    for name in ("csv", "ublox_ubx"):
+        source = replace(low.meta.sources[0], format=name)
+        of_format = low.replace(meta=replace(low.meta, sources=(source,)))
+        (found,) = checked(of_format, POINT).findings
+        assert "--height-offset UNDULATION" in found.cure
+        assert ("--geoid UNDULATION" in found.cure.replace("--truth-geoid", "")) == (name == "csv")
+        assert said(checked(repair(of_format, height_offset_m=44.5), POINT)) == [("E26", "info")]
+
+
+def test_a_few_large_levels_are_no_stand_ins() -> None:
+    roof = standing()
+    hpl = roof.table["hpl_m"].to_numpy().copy()
+    hpl[3] = 9999.0
+    assert said(checked(changed(roof, hpl_m=hpl))) == []
+    hpl[[30, 31]] = 9999.0, 3000.0
+    assert said(checked(changed(roof, hpl_m=hpl))) == []
+
+
+def test_one_far_position_is_no_other_receiver() -> None:
+    roof = standing()
+    lat = roof.table["lat_deg"].to_numpy().copy()
+    lat[700] += 5.0
+    assert "E06" not in [c for c, _ in said(checked(changed(roof, lat_deg=lat)))]

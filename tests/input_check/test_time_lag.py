@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sbas.input_check import repair
 from sbas.input_check.against_truth import Comparison
 from sbas.input_check.sampled_epochs import SampledEpochs
 from sbas.input_check.time_lag import Lag, best_lag
@@ -89,3 +90,32 @@ def test_another_train_is_no_lag() -> None:
     table = track.table.assign(lat_deg=track.table["lat_deg"] + 0.02)
     assert not [f for f in checked(train, Trajectory(table, frame="x")).findings
                 if f.code == "E02" and f.severity == "error"]  # fmt: skip
+
+
+@pytest.mark.parametrize("late_s", [0.9, 0.4, -0.6])
+def test_a_part_of_a_second_that_makes_events_is_an_error_with_a_cure_that_works(
+    late_s: float,
+) -> None:
+    train, track = journey(900)
+    late = moved(train, late_s)
+    (found,) = [f for f in checked(late, track).findings if f.code == "E02"]
+    assert found.severity == "error"
+    option, value = found.cure.split(",")[0].split()
+    assert option == "--shift-s"
+    assert float(value) == pytest.approx(-late_s, abs=0.11)
+    assert said(checked(repair(late, shift_s=float(value)), track)) == [("E26", "info")]
+
+
+def test_a_part_of_a_second_that_noise_outweighs_is_a_warning() -> None:
+    """6 m/s for 0.8 s are 4.8 m: below three distances of 2 m and a tenth of 60 m."""
+    seconds = np.arange(0, 1500.0)
+    north = 6.0 * seconds
+    index = pd.DatetimeIndex(START + (seconds * 1e9).astype("m8[ns]"), name="time")
+    table = pd.DataFrame({"lat_deg": 50 + north / 111_229, "lon_deg": 15.0, "height_m": 300.0},
+                         index=index)  # fmt: skip
+    aside = np.where(np.arange(1500) % 4 < 2, 2.0, -2.0) / 71_700
+    walker = Recording(table.assign(lon_deg=15 + aside, hpl_m=60.0 + np.sin(seconds)))
+    found = [f for f in checked(moved(walker, 0.8), Trajectory(table, frame="x")).findings
+             if f.code == "E02"]  # fmt: skip
+    assert [f.severity for f in found] == ["warning"]
+    assert "--shift-s -0.8" in found[0].cure

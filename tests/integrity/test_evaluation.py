@@ -14,7 +14,7 @@ from sbas.integrity.evaluation import evaluate
 from sbas.integrity.position_error import position_errors
 from sbas.integrity.stanford import REGIONS, stanford_regions
 from sbas.recording import Flag, Recording
-from sbas.truth import Trajectory
+from sbas.truth import FixedPoint, Trajectory
 from tests.examples import POINT, quiet, recording
 
 
@@ -129,6 +129,21 @@ def test_without_truth_a_moving_recording_gives_levels_only() -> None:
     assert result.hpl_m is not None
     assert result.at(50.0).regions is None
     assert result.at(50.0).availability.availability.value == 1.0
+
+
+@pytest.mark.parametrize("truth", [None, POINT])
+def test_levels_without_any_position_are_judged_alone(truth: FixedPoint | None) -> None:
+    whole = quiet(1000)
+    hpl = np.where(np.arange(1000) < 250, 60.0, whole.table["hpl_m"])
+    table = whole.table.assign(lat_deg=np.nan, lon_deg=np.nan, height_m=np.nan, hpl_m=hpl)
+    result = evaluate(whole.replace(table=table), truth=truth)
+    assert result.at(50.0).availability.availability.value == 0.75
+    (said,) = (f for f in result.findings if f.code == "E01" and "level alone" in f.evidence)
+    assert "no position" in said.message or "no epoch has a position" in said.message
+    # One position is enough: then an epoch without one is down.
+    table = whole.table.assign(lat_deg=whole.table["lat_deg"].where(np.arange(1000) < 500))
+    result = evaluate(whole.replace(table=table), truth=truth)
+    assert result.at(50.0).availability.availability.value == 0.5
 
 
 def test_levels_outside_sbas_mode_are_no_levels() -> None:

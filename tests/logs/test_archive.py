@@ -38,6 +38,18 @@ def test_another_receiver_is_an_error_until_accepted() -> None:
     assert {f.severity for f in accept(findings, ["E06"])} == {"warning"}
 
 
+def test_levels_of_other_factors_are_told_in_words() -> None:
+    early, late = halves()
+    metas = [
+        replace(early.meta, pl=ProtectionLevelMeta("do229", k_h=k_h, k_v=5.33))
+        for k_h in (6.0, 6.18)
+    ]
+    sources = [part.replace(meta=meta) for part, meta in zip((early, late), metas, strict=True)]
+    (found,) = join_sources(sources).meta.findings
+    assert found.message.startswith("the files differ in their protection levels:")
+    assert found.evidence == "kind do229, K_H 6 and K_V 5.33; kind do229, K_H 6.18 and K_V 5.33"
+
+
 def test_labels_and_side_tables_are_joined() -> None:
     early, late = halves()
     parts = []

@@ -153,6 +153,33 @@ def test_the_limit_stops_while_bytes_come_out(tmp_path: Path, packing: str) -> N
     assert plain_file(path, max_output=5_000_000).path.stat().st_size == 5_000_000
 
 
+@pytest.mark.parametrize(
+    ("packing", "limit"),
+    [("gzip", 5_000_000), ("xz", 5_000_000), ("zip", 5_000_000), ("bzip2", 0), ("compress", 0)],
+)
+def test_the_limit_that_is_named_will_do(tmp_path: Path, packing: str, limit: int) -> None:
+    data = b"".join(b"%d" % i for i in range(800_000))[:5_000_000].ljust(5_000_000)
+    path = put(tmp_path, PACKERS[packing](data))
+    with pytest.raises(InputError, match="E21") as caught:
+        plain_file(path, max_output=100_000)
+    named = int(caught.value.cure.split()[1])
+    if limit:
+        assert named == limit
+        assert plain_file(path, max_output=named).path.stat().st_size == limit
+    else:
+        assert "raise that until it is read" in caught.value.cure
+
+
+def test_the_limit_for_members_one_after_the_other_will_do(tmp_path: Path) -> None:
+    # The trailer is of the last member, 10 bytes: what deflate can become at most is named.
+    packed = gzip.compress(bytes(3_000_000)) + gzip.compress(b"0123456789")
+    with pytest.raises(InputError, match="E21") as caught:
+        plain_file(put(tmp_path, packed), max_output=100_000)
+    named = int(caught.value.cure.split()[1])
+    assert 3_000_010 <= named <= 1032 * len(packed)
+    assert plain_file(put(tmp_path, packed), max_output=named).path.stat().st_size == 3_000_010
+
+
 def test_a_bomb_is_refused_without_an_option(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -73,13 +73,14 @@ def test_one_of_several_lines_is_named(tmp_path: Path) -> None:
 def test_heights_are_asked_for(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nobody said") as caught:
         load_track(put(tmp_path, line(HIGH)))
-    assert "height='geoid'" in caught.value.cure
+    assert "--track-height geoid with --truth-geoid UNDULATION" in caught.value.cure
     path = put(tmp_path, line(HIGH))
     assert load_track(path, height="ellipsoidal").parts[0][:, 2].tolist() == [250.0, 251.0]
     assert load_track(path, height="geoid", geoid=44.5).parts[0][0, 2] == 294.5
     assert np.isnan(load_track(path, height="ignore").parts[0][:, 2]).all()
-    with pytest.raises(InputError, match="no undulation"):
+    with pytest.raises(InputError, match="no undulation") as caught:
         load_track(path, height="geoid")
+    assert caught.value.cure.startswith("--truth-geoid UNDULATION")
     assert load_track(put(tmp_path, line(HIGH, height="ellipsoidal"))).has_heights
     with pytest.raises(InputError, match="nobody said"):
         load_track(put(tmp_path, line(HIGH, height=["ellipsoidal"])))

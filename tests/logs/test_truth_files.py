@@ -11,6 +11,7 @@ import pytest
 
 from sbas.exceptions import InputError
 from sbas.logs.arrow import parquet
+from sbas.logs.delimited import delimited_text
 from sbas.logs.truth_files import read_truth_table
 from sbas.recording import Recording
 
@@ -90,7 +91,29 @@ def test_the_time_scale_serves_a_file_that_does_not_say_it(tmp_path: Path) -> No
     assert str(read_truth_table(silent, time_scale="UTC").index[0]) == "2025-05-23 14:09:34"
     assert str(read_truth_table(silent, time_scale="GPST").index[0]) == "2025-05-23 14:09:16"
     said = put(tmp_path, "gpst,lat,lon,h\n" + ROWS)
-    assert str(read_truth_table(said, time_scale="UTC").index[0]) == "2025-05-23 14:09:16"
+    # What is asked goes before the header, with the warning that a recording carries.
+    table = read_truth_table(said, time_scale="UTC")
+    recording = delimited_text.read(said, time_scale="UTC")
+    assert str(table.index[0]) == str(recording.table.index[0]) == "2025-05-23 14:09:34"
+    (warning,) = (f for f in recording.meta.findings if f.code == "E26")
+    assert table.attrs["findings"] == [warning.to_dict()]
+    assert "findings" not in read_truth_table(said, time_scale="GPST").attrs
+
+
+@pytest.mark.parametrize(
+    ("text", "cure"),
+    [
+        ("time,lat,lon,alt\n" + ROWS, "--truth-geoid"),
+        ("time,lat,lon,h\n2016-12-31 23:59:60,50,15,289.5\n2017-01-01 00:00:00,50,15,289.5\n",
+         "--truth-time-scale UTC"),
+        ("gpst,lat,lon,h\n" + ROWS.replace(",50", "Z,50"), "--truth-time-scale UTC"),
+        ("time;lat;lon;h\n" + ROWS.replace(",", ";").replace("289.5", "289,5"), "decimal points"),
+    ],
+)  # fmt: skip
+def test_cures_name_options_of_the_truth(tmp_path: Path, text: str, cure: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_truth_table(put(tmp_path, text))
+    assert cure in caught.value.cure
 
 
 def test_an_undulation_for_the_recording_leaves_ellipsoidal_heights(tmp_path: Path) -> None:

@@ -196,7 +196,8 @@ def _invert(
     observed: float, design: Design, lattice: float, confidence: float, known_s: float
 ) -> tuple[float | None, float | None, float | None, int]:
     """Where the quantile curves of ln(estimate) over ln(tau) pass the observed one."""
-    log_observed = math.log(observed) if math.isfinite(observed) else math.inf
+    # A fit to a fall within one lag can give 0: below half a step nothing is told apart.
+    log_observed = math.log(observed or design.step_s / 2) if math.isfinite(observed) else math.inf
     tail = (1 - confidence) / 2
     # A quantile of so many draws has an error of its own: it is moved outward by one sigma of it.
     tail = max(tail - math.sqrt(tail * (1 - tail) / design.draws), 0.0)
@@ -209,7 +210,7 @@ def _invert(
     def quantiles(j: int) -> Floats:
         drawn = running[j].result()
         q = np.quantile(drawn, [tail, 0.5, 1 - tail], method="inverted_cdf")
-        if design.shrink < 1:
+        if design.shrink < 1 and math.isfinite(q[1]):
             # A spread falls with the root of the length, a bias with the length.
             true = j * lattice
             q = true + (q[1] - true) * design.shrink**2 + (q - q[1]) * design.shrink
@@ -283,7 +284,7 @@ def simulated_estimates(design: Design, log_tau: float) -> Floats:
     Returns
     -------
     (draws,) ln(tau) by the estimator of `fit_exponentials`; inf where r never falls to the
-    floor. The same design and tau give the same numbers.
+    floor, -inf where it falls there within one lag. The same design and tau give the same numbers.
 
     Notes
     -----
@@ -319,7 +320,8 @@ def simulated_estimates(design: Design, log_tau: float) -> Floats:
         shares = np.einsum("bn,jn->bj", flat, projection)
         flat -= np.einsum("bj,jn->bn", shares, projection)
         estimates.append(fit_exponentials(_mean_correlation(x, pairs), design.step_s).tau_s)
-    return np.sort(np.log(np.concatenate(estimates)))
+    with np.errstate(divide="ignore"):
+        return np.sort(np.log(np.concatenate(estimates)))
 
 
 @lru_cache(maxsize=2)

@@ -28,6 +28,7 @@ from sbas.logs.arrow.parquet_tables import (
     impossible_levels,
     one_array,
     refuse_memory,
+    refuse_second_file,
     words,
 )
 from sbas.logs.arrow.parquet_writer import LAYOUT_KEY, META_KEY, TIME_TYPE, Layout, sha256_of, write
@@ -143,6 +144,13 @@ def scan(
                     cure="write or copy the file again",
                 )
             )
+        if LAYOUT_KEY not in (file.metadata.metadata or {}):
+            findings.append(
+                Finding(
+                    "E25", "warning", "another program wrote the file again: epochs may be missing",
+                    where=str(path), cure="use the file as sbas wrote it",
+                )
+            )  # fmt: skip
         names = tuple(name for name in schema.names if name != "time")
         _check_schema(schema, path)
         impossible = count_impossible_levels(file)
@@ -212,6 +220,7 @@ def opened(path: Path) -> Iterator[pq.ParquetFile]:
     """The file, with damage found now or later as InputError."""
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            refuse_second_file(file, path)
             yield file
     except MemoryError as error:
         refuse_memory(path, error)
@@ -222,6 +231,7 @@ def opened(path: Path) -> Iterator[pq.ParquetFile]:
 def _damaged(path: Path, error: Exception) -> NoReturn:
     raise InputError(
         "the Parquet file is cut or damaged",
+        code="E10",
         where=str(path),
         evidence=str(error)[:300],
         cure="write or copy it again; its end holds the index, so a cut file cannot be read",

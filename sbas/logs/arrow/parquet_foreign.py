@@ -24,6 +24,7 @@ from sbas.logs.arrow.parquet_tables import (
 )
 from sbas.logs.delimited.column_map import MappedTable, convert_columns
 from sbas.logs.delimited.column_names import (
+    HEMISPHERES,
     TIME_CURE,
     MappedColumn,
     applied_geoid,
@@ -36,6 +37,9 @@ from sbas.logs.delimited.column_names import (
 from sbas.logs.format import Progress
 from sbas.logs.time_stamps import (
     Stamps,
+    counts_leap_seconds,
+    leap_stamp_finding,
+    leap_stamps_of_utc,
     parse_stamps,
     scale_of_stamps,
     stamps_to_gps,
@@ -44,7 +48,7 @@ from sbas.logs.time_stamps import (
 from sbas.recording import Recording, RecordingMeta, with_columns
 from sbas.timescales import TimeScale
 
-_WORDS = ("mode", "environment", "hardware_fault")
+_WORDS = ("mode", "environment", "hardware_fault", *HEMISPHERES)
 
 
 def read_foreign(
@@ -156,6 +160,13 @@ def map_foreign(
     scale, findings = scale_of_stamps(
         stamps, time_scale, said=said, header=header, by_week=by_week, where=where
     )
+    if not counts_leap_seconds(scale) and stamps.leap.any():
+        leaps = int(np.count_nonzero(leap_stamps_of_utc(stamps)))
+        findings += leap_stamp_finding(leaps, scale)
+        bad += int(np.count_nonzero(stamps.leap)) - leaps
+        good = good.copy()
+        good[good] = ~stamps.leap
+        stamps = stamps[~stamps.leap]
     times, leap_seconds, conversions = stamps_to_gps(stamps, scale)
     if bad:
         share = bad / len(good)

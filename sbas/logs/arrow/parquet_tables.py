@@ -177,3 +177,30 @@ def refuse_memory(path: Path, error: BaseException) -> NoReturn:
         evidence=str(error)[:300],
         cure="read fewer columns, or split the file",
     ) from error
+
+
+def refuse_second_file(file: pq.ParquetFile, path: Path) -> None:
+    """E24 for two files one behind the other: the last index would be read with the first pages."""
+    columns = [
+        file.metadata.row_group(g).column(c)
+        for g in range(file.num_row_groups)
+        for c in range(file.metadata.num_columns)
+    ]
+    pages_end = max(
+        (
+            (c.dictionary_page_offset or c.data_page_offset) + c.total_compressed_size
+            for c in columns
+        ),
+        default=4,
+    )
+    with open(path, "rb") as stream:
+        stream.seek(pages_end)
+        between = stream.read(FREE_BYTES)
+    if b"PAR1PAR1" in between:
+        raise InputError(
+            "two Parquet files stand one behind the other",
+            code="E24",
+            where=f"{path}, byte {pages_end + between.index(b'PAR1PAR1') + 4:,}",
+            evidence=f"pages end at byte {pages_end:,} of {path.stat().st_size:,}",
+            cure="write each to a file of its own and give both",
+        )

@@ -6,7 +6,6 @@ What CSV and Parquet tables of other programs share, once their headers have nam
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -18,8 +17,12 @@ from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
+from sbas.logs.delimited.column_names import HEMISPHERES
+from sbas.logs.delimited.earth_fixed import EarthFixedCounts, geodetic
+from sbas.logs.delimited.hemispheres import with_signs
+from sbas.logs.delimited.mode_words import encoded, modes, plain_word
 from sbas.logs.sentinels import remove_sentinels, sentinel_findings, wrapped_longitudes
-from sbas.recording import COLUMNS, MODES, SBAS_MODES, Flag, mode_categories
+from sbas.recording import COLUMNS, MODES, SBAS_MODES, Flag
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,8 @@ class ColumnCounts:
     altitudes : heights above the geoid that are there.
     lon_deg : smallest and largest longitude, before any is wrapped.
     beyond : longitudes above 180 degrees.
+    letters : letters of hemispheres by column and letter.
+    earth_fixed : positions from x, y, z.
     """
 
     rows: int = 0
@@ -42,6 +47,8 @@ class ColumnCounts:
     altitudes: int = 0
     lon_deg: tuple[float, float] = (math.inf, -math.inf)
     beyond: int = 0
+    letters: Counter[tuple[str, str]] = field(default_factory=Counter)
+    earth_fixed: EarthFixedCounts = field(default_factory=EarthFixedCounts)
 
     def __add__(self, other: ColumnCounts) -> ColumnCounts:
         return ColumnCounts(
@@ -51,6 +58,8 @@ class ColumnCounts:
             self.altitudes + other.altitudes,
             (min(self.lon_deg[0], other.lon_deg[0]), max(self.lon_deg[1], other.lon_deg[1])),
             self.beyond + other.beyond,
+            self.letters + other.letters,
+            self.earth_fixed + other.earth_fixed,
         )
 
     @property
@@ -90,7 +99,8 @@ def convert_columns(
 
     Raises
     ------
-    InputError : mode words that are not known, or flags that are no bits.
+    InputError : mode words that are not known, flags that are no bits, or letters of hemispheres
+        that are none or contradict a sign.
     """
     columns, counts = convert_piece(
         values, texts, rows=rows, factors=factors, mode_map=mode_map, geoid=geoid, where=where
@@ -108,6 +118,19 @@ def column_findings(
     elif geoid is not None:
         findings.append(geoid_unused())
     findings += counts.wrapped
+    findings += counts.earth_fixed.findings()
+    if counts.letters:
+        findings.append(
+            Finding(
+                "E26",
+                "info",
+                "latitudes and longitudes have the signs of their hemisphere columns",
+                evidence=", ".join(
+                    f"{HEMISPHERES[name]} {letter} {n:,}"
+                    for (name, letter), n in sorted(counts.letters.items())
+                ),
+            )
+        )
     if counts.odd_counts:
         findings.append(
             Finding(
@@ -143,7 +166,14 @@ def convert_piece(
     flags = np.zeros(rows, np.uint32)
     if "flags" in raw:
         flags |= _flag_bits(raw.pop("flags"), where)
+    places, earth_fixed = geodetic(raw, factors)
+    raw |= places
     sentinels, flags = remove_sentinels(raw, flags)
+    letters: Counter[tuple[str, str]] = Counter()
+    for name, signed in HEMISPHERES.items():
+        if name in texts and signed in raw:
+            raw[signed], counted = with_signs(raw[signed], texts[name], name, where)
+            letters += counted
     columns: dict[str, object] = {}
     altitudes = 0
     if "altitude" in raw:
@@ -151,7 +181,9 @@ def convert_piece(
         altitudes = int(np.count_nonzero(~np.isnan(altitude)))
         columns["height_m"], _ = ellipsoidal(altitude, geoid)
     odd: Counter[str] = Counter()
-    counts = ColumnCounts(rows, _by_value(sentinels), odd, altitudes)
+    counts = ColumnCounts(
+        rows, _by_value(sentinels), odd, altitudes, letters=letters, earth_fixed=earth_fixed
+    )
     for name, array in raw.items():
         factor = factors.get(name, 1.0)
         array = array if factor == 1.0 else array * factor
@@ -174,10 +206,12 @@ def convert_piece(
         else:
             columns[name] = array
     for name, words in texts.items():
+        if name in HEMISPHERES:
+            continue
         if name == "mode":
             columns[name] = modes(words, mode_map, where=where)
         elif name == "environment":
-            codes, uniques = _encoded(words)
+            codes, uniques = encoded(words)
             named = [i for i, word in enumerate(uniques) if word]
             lookup = np.full(len(uniques) + 1, -1)
             lookup[named] = np.arange(len(named))
@@ -272,56 +306,15 @@ def geoid_unused() -> Finding:
     return Finding(
         "E25",
         "warning",
-        "geoid= was given but not used: no height above the geoid is in the file",
+        "an undulation was given but not used: no height above the geoid is in the file",
         cure="leave out --geoid; name the column 'altitude' if its heights are above the geoid",
     )
 
 
-def _encoded(words: Any) -> tuple[NDArray[np.int32], list[str]]:
-    encoded = words.fill_null("").dictionary_encode()
-    codes: NDArray[np.int32] = encoded.indices.to_numpy(zero_copy_only=False)
-    return codes, encoded.dictionary.to_pylist()
-
-
-def modes(words: Any, mode_map: Mapping[str, str] | None, *, where: str) -> pd.Categorical:
-    """Column `mode` of (n,) pyarrow strings: names of `MODES`, or words that `mode_map` knows.
-
-    Raises
-    ------
-    InputError : words that are neither, or a map to names that are no modes.
-    """
-    table = {name: name for name in MODES}
-    if mode_map is not None:
-        table = {_plain(str(word)): name for word, name in mode_map.items()}
-        if strange := sorted(set(table.values()) - set(MODES)):
-            raise InputError(
-                f"mode_map names unknown modes: {', '.join(map(repr, strange))}",
-                cure=f"known modes are {', '.join(MODES)}",
-            )
-    codes, uniques = _encoded(words)
-    plain = [_plain(word) for word in uniques]
-    unknown = [word for word in plain if word and word not in table]
-    if unknown:
-        shown = ", ".join(unknown[:12])[:300]
-        raise InputError(
-            "the mode column has values whose meaning is not known",
-            where=where,
-            evidence=shown,
-            cure=f"say what they mean: mode_map={{{unknown[0][:40]!r}: 'sbas', ...}}; "
-            f"modes are {', '.join(MODES)}",
-        )
-    lookup = np.array([MODES.index(table[word]) if word else -1 for word in plain] + [-1], np.int8)
-    return mode_categories(lookup[codes])
-
-
-def _plain(word: str) -> str:
-    return re.sub(r"^(\d+)\.0*$", r"\1", word.strip())
-
-
 def _booleans(words: Any, where: str) -> NDArray[np.bool_]:
-    codes, uniques = _encoded(words)
+    codes, uniques = encoded(words)
     table = {"true": True, "1": True, "false": False, "0": False, "": False}
-    plain = [_plain(word).lower() for word in uniques]
+    plain = [plain_word(word).lower() for word in uniques]
     if unknown := [word for word in plain if word not in table]:
         raise InputError(
             "column hardware_fault has values other than true and false",

@@ -6,7 +6,7 @@ import functools
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
@@ -29,10 +29,25 @@ ALIASES: dict[str, str] = {
     "mode": "mode", "fix": "mode", "quality": "mode", "q": "mode",
     "herl": "herl_m", "verl": "verl_m",
     "sdn": "sigma_n_m", "sde": "sigma_e_m", "sdu": "sigma_u_m",
+    **dict.fromkeys((
+        "latdir", "latdirection", "lathem", "lathemi", "lathemisphere", "latitudedir",
+        "latitudedirection", "latitudehemisphere", "latref", "latituderef", "n/s", "nsindicator",
+        "northsouth",
+    ), "lat_hemisphere"),
+    **dict.fromkeys((
+        "londir", "londirection", "lonhem", "lonhemi", "lonhemisphere", "longitudedir",
+        "longitudedirection", "longitudehemisphere", "lonref", "longituderef", "e/w",
+        "ewindicator", "eastwest", "ew",
+    ), "lon_hemisphere"),
 }  # fmt: skip
 """Names after lower-casing and taking out `_`, `-`, blanks and units; documented columns are
-known by their own names as well. `altitude` is a height above the geoid."""
+known by their own names as well. `altitude` is a height above the geoid; `lat_hemisphere` and
+`lon_hemisphere` hold the letters N, S, E, W. `ns` beside `ew` is such a column, else satellites."""
 
+HEMISPHERES = {"lat_hemisphere": "lat_deg", "lon_hemisphere": "lon_deg"}
+"""Columns of letters, and the column whose sign they give."""
+EARTH_FIXED = ("ecef_x_m", "ecef_y_m", "ecef_z_m")
+"""Earth-fixed coordinates, of headers `x`, `y`, `z`, where no latitude, longitude or height is."""
 TIME_PARTS = ("time", "date", "week", "tow")
 TRUTH_COLUMNS = {"sigma_h_m": "m", "sigma_v_m": "m", "heading_deg": "deg"}
 """Further columns of a truth trajectory, with their units."""
@@ -50,6 +65,7 @@ _DIMENSIONS = {
     **{name: column.unit for name, column in COLUMNS.items()},
     **TRUTH_COLUMNS,
     "altitude": "m", "tow": "s", "time": "", "date": "", "week": "1",
+    **dict.fromkeys(HEMISPHERES, ""),
 }  # fmt: skip
 
 _SCALED_TIME = r"\s*(time|timestamp)[\s_-]*[\[(]?\s*(utc|gpst|gps)\s*[\])]?\s*"
@@ -157,8 +173,11 @@ def map_headers(
     mapped: dict[str, MappedColumn] = {}
     others: dict[str, MappedColumn] = {}
     taken: dict[str, int] = {}
+    letters = {_squash(header) for header in headers} >= {"ns", "ew"}
     for index, header in enumerate(headers):
         name, stem, unit, scale = _meaning(header, further)
+        if letters and _squash(header) == "ns":
+            name, stem, unit, scale = "lat_hemisphere", header, None, ""
         if name is None:
             base = re.sub(r"\W+", "_", header.removeprefix("x_")).strip("_") or str(index + 1)
             # No base ends in "_", so the number of those tells equal ones apart.
@@ -184,10 +203,26 @@ def map_headers(
             )
         factor = 1.0 if unit is None else dimension[unit]
         mapped[name] = MappedColumn(index, header, factor, scale)
+    if not mapped.keys() & {"lat_deg", "lon_deg", "height_m", "altitude"}:
+        for name, column in _earth_fixed(others).items():
+            mapped[name] = column
+            others = {n: other for n, other in others.items() if other.index != column.index}
     if "height_m" in mapped and "altitude" in mapped:
         # Both heights are there: the ellipsoidal one serves, the other is kept aside.
         others["x_altitude"] = mapped.pop("altitude")
     return mapped, others
+
+
+def _earth_fixed(others: Mapping[str, MappedColumn]) -> dict[str, MappedColumn]:
+    """Columns EARTH_FIXED among those of no other meaning; none unless all three are there."""
+    found: dict[str, MappedColumn] = {}
+    for column in others.values():
+        stem, unit = _split_unit(column.header)
+        axis = re.sub("ecef", "", _squash(stem))
+        name = f"ecef_{axis}_m"
+        if name in EARTH_FIXED and name not in found and (unit or "m") in _UNITS["m"]:
+            found[name] = replace(column, factor=_UNITS["m"][unit or "m"])
+    return {name: found[name] for name in EARTH_FIXED} if len(found) == 3 else {}
 
 
 def header_sources(
@@ -223,6 +258,9 @@ def needed_columns(
             asked |= set(pair)
     if "height_m" in asked:
         asked.add("altitude")
+    if asked & {"lat_deg", "lon_deg", "height_m"}:
+        asked |= set(EARTH_FIXED)
+    asked |= {letters for letters, name in HEMISPHERES.items() if name in asked}
     return tuple(name for name in (*available, *others) if name in asked)
 
 

@@ -28,7 +28,13 @@ from sbas.logs.delimited.column_map import (
 from sbas.logs.delimited.delimited_layout import Layout
 from sbas.logs.delimited.delimited_lines import LineReader, Part
 from sbas.logs.text_input import BAD_SHARE, bad_line_finding, parse_numbers
-from sbas.logs.time_stamps import scale_of_stamps, stamps_to_gps
+from sbas.logs.time_stamps import (
+    counts_leap_seconds,
+    leap_stamp_finding,
+    leap_stamps_of_utc,
+    scale_of_stamps,
+    stamps_to_gps,
+)
 from sbas.logs.time_tally import TimeTally
 from sbas.timescales import TimeScale
 
@@ -52,7 +58,8 @@ class Tally:
     times : of all readable stamps.
     columns : of the columns.
     bad_lines, example : lines left out, and the first of them.
-    leaps : stamps of a second 60, which GPS time does not have.
+    leaps : stamps of a leap second of UTC, on a scale that has none.
+    strange_leaps : stamps of a second 60 where not even UTC had one, on such a scale.
     textual : columns `x_...` in which a field is no number.
     """
 
@@ -64,6 +71,7 @@ class Tally:
     words: Counter[str] = field(default_factory=Counter)
     repeated_headers: int = 0
     leaps: int = 0
+    strange_leaps: int = 0
     textual: frozenset[str] = frozenset()
 
     def __add__(self, other: Tally) -> Tally:
@@ -76,6 +84,7 @@ class Tally:
             self.words + other.words,
             self.repeated_headers + other.repeated_headers,
             self.leaps + other.leaps,
+            self.strange_leaps + other.strange_leaps,
             self.textual | other.textual,
         )
 
@@ -116,10 +125,11 @@ class Conversion:
         scale = self.scale(times)[0] if settled is None else settled.scale
         stamps = part.stamps
         keep: NDArray[np.bool_] | None = None
-        leaps = 0
-        if scale == "GPST" and stamps.leap.any():
+        leaps = strange_leaps = 0
+        if stamps.leap.any() and not counts_leap_seconds(scale):
             keep = ~stamps.leap
-            leaps = int(np.count_nonzero(stamps.leap))
+            leaps = int(np.count_nonzero(leap_stamps_of_utc(stamps)))
+            strange_leaps = int(np.count_nonzero(stamps.leap)) - leaps
             stamps = stamps[keep]
         values, texts, textual = self._values(part, keep, settled)
         columns, counts = convert_piece(
@@ -142,6 +152,7 @@ class Conversion:
             part.words,
             part.repeated_headers,
             leaps,
+            strange_leaps,
             textual,
         )
         return pd.DataFrame(columns, index=pd.DatetimeIndex(gps, name="time")), tally
@@ -175,8 +186,11 @@ class Conversion:
         `lost_line` shows.
         """
         scale, scale_findings = self.scale(tally.times)
-        bad = tally.bad_lines + lost_lines + tally.leaps
-        example = tally.example or lost_line or "second 60 in GPS time"
+        bad = tally.bad_lines + lost_lines + tally.strange_leaps
+        example = tally.example or lost_line
+        if not example:
+            lost = "lines with NUL bytes"
+            example = lost if lost_lines else f"a second 60, and the times are {scale}"
         rows = tally.columns.rows
         return (
             *_decimal_finding(self.reader.layout),
@@ -185,6 +199,7 @@ class Conversion:
             *bad_line_finding(bad, rows, example),
             *_unreadable_findings(tally.unreadable, rows),
             *scale_findings,
+            *leap_stamp_finding(tally.leaps, scale),
             *tally.times.conversions(scale)[1],
             *word_findings(tally.words),
             *column_findings(

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from sbas.exceptions import InputError
 from sbas.logs.delimited.column_names import (
+    HEMISPHERES,
     TIME_PARTS,
     TRUTH_COLUMNS,
     known_names,
@@ -22,7 +23,7 @@ DELIMITERS = (" ", ",", "\t", ";")
 
 _NO_UNIT = re.compile(r"[-\s.]*|nan|-nan|n/?a|#n/a|null|none", re.IGNORECASE)
 _DATE_PATTERN = re.compile(r"[ymdhsfz:/.\-_ t%]*", re.IGNORECASE)
-_WORDS = ("week", "mode", "environment", "hardware_fault", "flags")
+_WORDS = ("week", "mode", "environment", "hardware_fault", "flags", *HEMISPHERES)
 
 
 @dataclass(frozen=True)
@@ -135,18 +136,28 @@ def find_layout(text: str, *, where: str, decimal: str | None = None) -> Layout:
     rows = data_rows(text, layout)
     if rows and fitting <= 0.5:
         longer = sum(len(row) > len(layout.headers) for row in rows) > len(rows) / 2
-        comma = longer and layout.delimiter == ","
+        # A header that names nothing is a line of data: the real one was lost.
+        named = bool(known_names(layout.headers))
+        comma = named and longer and layout.delimiter == ","
+        count = len(layout.headers)
+        other = next(row for row in rows if len(row) != count)
+        number = next(
+            n
+            for n, line in enumerate(lines[layout.header_line + 1 :], layout.header_line + 2)
+            if split_line(line, layout.delimiter) == other
+        )
         raise InputError(
             "lines have more fields than the header: decimal commas between commas?"
             if comma
             else "lines have another number of fields than the header",
             code="E20" if comma else "E10",
             where=where,
-            evidence=f"{len(layout.headers)} names, {len(rows[0])} fields: "
-            f"{layout.delimiter.join(rows[0])[:120]}",
+            evidence=f"{sum(len(row) != count for row in rows)} of the first {len(rows)} lines; "
+            f"fields of the header {count}, of line {number} {len(other)}: "
+            f"{layout.delimiter.join(other)[:120]}",
             cure="write decimal points, or separate the fields by ';' and say --decimal ,"
             if comma
-            else "give every field a name in the header",
+            else "take such lines out, or give every field a name in the header",
         )
     layout = with_line_of_units(lines, layout, where)
     if decimal is not None:

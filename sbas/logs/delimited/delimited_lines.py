@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
 from sbas.logs.delimited.column_names import (
+    HEMISPHERES,
     TIME_PARTS,
     MappedColumn,
     map_headers,
@@ -41,9 +42,9 @@ from sbas.logs.time_stamps import (
     week_stamps,
 )
 
-_TEXT_COLUMNS = ("time", "date", "mode", "environment", "hardware_fault")
+_TEXT_COLUMNS = ("time", "date", "mode", "environment", "hardware_fault", *HEMISPHERES)
 _COMMENT_LINE = re.compile(rb"^[ \t]*[#%][^\n]*\n?", re.MULTILINE)
-_TIME_WORD = re.compile(rb"time|gpst|utc|week", re.IGNORECASE)
+_TIME_WORDS = (b"time", b"gpst", b"utc", b"week")
 _LONGEST_HEADER_LINE = 1 << 14
 _DECIMAL_CURE = (
     "say which it is, --decimal , or --decimal . (numbers with the other sign are then missing); "
@@ -80,6 +81,11 @@ def joined(parts: Sequence[Part]) -> Part:
         sum((part.words for part in parts), Counter()),
         sum(part.repeated_headers for part in parts),
     )
+
+
+def _names_time(text: bytes) -> bool:
+    lowered = text.lower()
+    return any(word in lowered for word in _TIME_WORDS)
 
 
 def _one_array(arrays: Sequence[Any]) -> Any:
@@ -162,7 +168,7 @@ class LineReader:
         commented = b"#" in block or b"%" in block
         bare = _COMMENT_LINE.sub(b"", block) if commented else block
         part = self._parsed(bare)
-        if not (part.bad_lines or commented) or not _TIME_WORD.search(block):
+        if not (part.bad_lines or commented) or not _names_time(block):
             return part
         # A header has no readable time: lines are looked at one by one only where one has none.
         texts = block.splitlines(keepends=True)
@@ -203,7 +209,7 @@ class LineReader:
 
     def _repeats_header(self, line: bytes) -> bool:
         """Whether a line is the header once more; InputError where it is another header."""
-        if len(line) > _LONGEST_HEADER_LINE or not _TIME_WORD.search(line):
+        if len(line) > _LONGEST_HEADER_LINE or not _names_time(line):
             return False
         text = line.decode("utf-8")
         for delimiter in (d for d in DELIMITERS if d in text):

@@ -248,7 +248,7 @@ def _mapped(
             "no line has a readable time" if bad else "the file has a header and no data",
             code="" if bad else "E15",
             where=reader.where,
-            evidence=tally.example or lines.cut_line,
+            evidence=tally.example or lines.cut_line or "lines with NUL bytes" * bool(bad),
             cure=TIME_CURE if bad else "check that the recording was written",
         )
     scale, _ = conversion.scale(tally.times)

@@ -111,7 +111,10 @@ def parse_header(text: str, *, where: str) -> Layout:
         datum, height = (ecef[1] if ecef else ""), "ellipsoidal"
     if len(set(names)) < len(names):
         raise InputError(
-            "two columns of the .pos file have one name", where=where, evidence=columns
+            "two columns of the .pos file have one name",
+            where=where,
+            evidence=columns,
+            cure="rename the wrong one in the header line, or write the solution again",
         )
     position = ("x-ecef", "y-ecef", "z-ecef") if "x-ecef" in names else ("lon", "height")
     lacking = [n for n in (*position, "Q") if not any(name.startswith(n) for name in names)]

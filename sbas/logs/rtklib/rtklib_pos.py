@@ -270,6 +270,7 @@ def _meta(tally: _Tally, lines: _Lines, geoid: float | None) -> RecordingMeta:
     if not tally.times.rows:
         raise InputError(
             "no line of the .pos file can be read",
+            code="E10",
             where=lines.reader.where,
             evidence=example,
             cure="the lines do not fit the header line: write the solution again",
@@ -292,10 +293,14 @@ def _meta(tally: _Tally, lines: _Lines, geoid: float | None) -> RecordingMeta:
 
 def sniff(head: bytes, middle: bytes, tail: bytes, path: Path) -> Match:
     """95 for the `%` line that names RTKLIB's columns."""
-    found = COLUMN_HEADER.search(decode_head(head).replace("\r", ""))
+    found = COLUMN_HEADER.search(_unix_lines(decode_head(head)))
     if found is None:
         return Match(0, "no header of RTKLIB")
     return Match(95, f"RTKLIB header with {found[3].split()[0]}")
+
+
+def _unix_lines(text: str) -> str:
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 FORMAT = Format(

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from sbas.estimate import Refusal
-from sbas.recording_survey import survey
 from sbas.integrity.correlation import error_grid as module
 from sbas.integrity.correlation.error_grid import ErrorGrid, error_grid, room
 from sbas.integrity.position_error import position_errors
 from sbas.recording import Recording
+from sbas.recording_survey import survey
 from sbas.truth import FixedPoint, Trajectory
 from tests.examples import POINT, recording
 

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from sbas.integrity.correlation import tau_interval as tau_module
 from sbas.integrity.correlation.autocorrelation import autocorrelation
-from sbas.integrity.correlation.robust_tau import Cleaned, clean, fit_exponentials, longest_lag
+from sbas.integrity.correlation.robust_tau import (
+    Cleaned,
+    ExponentialFits,
+    clean,
+    fit_exponentials,
+    longest_lag,
+)
 from sbas.integrity.correlation.tau_interval import (
     Design,
     TauInterval,
@@ -174,3 +183,26 @@ def test_a_sparse_record_and_one_with_empty_stretches_have_intervals(
         interval, _ = interval_of(x)
         assert interval.low_s is not None
         assert interval.low_s < tau < (interval.high_s or math.inf)
+
+
+def test_estimates_of_zero_are_below_all_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fall within one lag can be fitted by 0 s: no warning, and bounds that are numbers."""
+    design = Design(1.0, 200, (np.packbits(np.ones(200, bool)).tobytes(),), (), 0.0, 0.0, 0.8, 340)
+
+    def fits(r: NDArray[np.floating[Any]], step_s: float) -> ExponentialFits:
+        found = fit_exponentials(r, step_s)
+        return replace(found, tau_s=np.where(np.arange(len(r)) % 50, found.tau_s, 0.0))
+
+    monkeypatch.setattr(tau_module, "fit_exponentials", fits)
+    drawn = simulated_estimates.__wrapped__(design, math.log(5.0))
+    zeros = int(np.sum(np.isneginf(drawn)))
+    assert zeros == 7
+    assert np.isfinite(drawn[zeros:]).all()
+    assert (np.diff(drawn[zeros:]) >= 0).all()
+    simulated_estimates.cache_clear()
+    monkeypatch.setattr(tau_module, "fit_exponentials", fits)
+    value, low, high, _ = tau_module._invert(0.0, design, 0.5, 0.95, 200.0)
+    assert value is None or value < 5.0
+    assert high is None or high < 20.0
+    assert low is None
+    simulated_estimates.cache_clear()

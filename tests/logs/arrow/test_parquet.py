@@ -269,8 +269,26 @@ def test_a_cut_file_is_refused_at_every_length(tmp_path: Path) -> None:
     whole = path.read_bytes()
     for length in range(0, len(whole) - 1, 97):
         path.write_bytes(whole[:length])
-        with pytest.raises(InputError, match="cut or damaged"):
+        with pytest.raises(InputError, match="E10: the Parquet file is cut or damaged"):
             parquet.read(path)
+
+
+def test_two_files_one_behind_the_other_are_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, Recording(table_of(40), META))
+    once = path.read_bytes()
+    path.write_bytes(once + once)
+    for call in (parquet.read, parquet.scan):
+        with pytest.raises(InputError, match="E24: two Parquet files") as caught:
+            call(path)
+        assert f"byte {len(once):,}" in caught.value.where
+
+
+def test_a_file_that_another_program_wrote_again_says_so(tmp_path: Path) -> None:
+    path = written(tmp_path, Recording(table_of(40), META))
+    pq.write_table(pq.read_table(path).slice(0, 30), path)
+    back = parquet.read(path)
+    assert len(back) == 30
+    assert [(f.code, f.severity) for f in back.meta.findings][1:] == [("E25", "warning")]
 
 
 @given(st.data())
@@ -472,3 +490,15 @@ def test_progress_reaches_the_end(tmp_path: Path) -> None:
     source = parquet.scan(path, progress=lambda a, b: seen.append((a, b)))
     list(source.batches(["hpl_m"]))
     assert seen[-1] == (path.stat().st_size, path.stat().st_size)
+
+
+def test_a_foreign_table_with_a_leap_second_and_letters(tmp_path: Path) -> None:
+    path = tmp_path / "other.parquet"
+    stamps = ["2016-12-31 23:59:59", "2016-12-31 23:59:60", "2017-01-01 00:00:00"]
+    pd.DataFrame({"time": stamps, "lat": 33.5, "lat_dir": "S", "lon": 15.5}).to_parquet(path)
+    read = parquet.read(path, time_scale="GPST")
+    (found,) = (f for f in read.meta.findings if f.code == "E02")
+    assert (found.severity, found.cure, len(read.table)) == ("error", "--time-scale UTC", 2)
+    exact = parquet.read(path, time_scale="UTC").table
+    assert np.diff(exact.index).tolist() == [10**9, 10**9]
+    assert exact["lat_deg"].tolist() == [-33.5] * 3

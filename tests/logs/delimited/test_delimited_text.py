@@ -170,7 +170,17 @@ def test_modes_need_a_map(tmp_path: Path) -> None:
     text = f"time,fix\n{T}6,3\n{T}7,1\n{T}8,\n"
     with pytest.raises(InputError, match="not known") as caught:
         read(tmp_path, text)
-    assert "mode_map" in caught.value.cure
+    assert caught.value.cure.startswith("--mode-map 1=MODE,3=MODE with one of none, standalone")
+    words = f"time,fix\n{T}6,PA\n{T}7,NPA\n{T}8,sbas_npa\n"
+    with pytest.raises(InputError, match="not known") as caught:
+        read(tmp_path, words)
+    assert caught.value.cure.startswith("--mode-map NPA=sbas_npa,PA=sbas_pa; modes are")
+    # What the cure names is enough: documented names stay known beside it.
+    table = read(tmp_path, words, mode_map={"NPA": "sbas_npa", "PA": "sbas_pa"}).table
+    assert table["mode"].tolist() == ["sbas_pa", "sbas_npa", "sbas_npa"]
+    with pytest.raises(InputError, match="not known") as caught:
+        read(tmp_path, f"{words}{T}9,no idea\n", mode_map={"NPA": "sbas_npa", "PA": "sbas_pa"})
+    assert "--mode-map 'NPA=sbas_npa,PA=sbas_pa,no idea=MODE'" in caught.value.cure
     table = read(tmp_path, text, mode_map={"3": "sbas", 1: "standalone"}).table
     assert table["mode"].astype(object).tolist()[:2] == ["sbas", "standalone"]
     assert table["mode"].isna().tolist() == [False, False, True]
@@ -559,6 +569,12 @@ def test_decimal_commas_between_commas_stay_refused(tmp_path: Path) -> None:
     assert "--decimal ," in caught.value.cure
 
 
+def test_a_lost_header_is_no_matter_of_decimals(tmp_path: Path) -> None:
+    lines = f"5.50,15.25\n{T}6,50.5,15.25\n{T}7,50.6,15.35\n"
+    with pytest.raises(InputError, match="E10: lines have another number of fields"):
+        read(tmp_path, lines)
+
+
 def test_undecided_decimals_name_the_option(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="E20") as caught:
         read(tmp_path, f"time;lat;hpl\n{T}6;50,5;11.5\n")
@@ -699,3 +715,108 @@ def test_a_long_file_restricted_to_columns(tmp_path: Path) -> None:
     batches = list(source.batches(["hpl_m", "n_sv"]))
     assert len(batches) > 1
     assert pd.concat(batches)["hpl_m"].tolist() == [k + 0.5 for k in range(20)]
+
+
+LEAP = ["2016-12-31 23:59:59", "2016-12-31 23:59:60", "2017-01-01 00:00:00"]
+
+
+@pytest.mark.parametrize("header", ["time", "gpst"])
+def test_a_leap_second_proves_utc(tmp_path: Path, header: str) -> None:
+    text = f"{header},hpl\n" + "".join(f"{stamp},9.{i}\n" for i, stamp in enumerate(LEAP))
+    found = next(f for f in read(tmp_path, text).meta.findings if f.code == "E02")
+    assert (found.severity, found.cure) == ("error", "--time-scale UTC")
+    assert found.evidence.startswith("1 times with a second 60")
+    exact = read(tmp_path, text, time_scale="UTC")
+    # GPST - UTC was 17 s before and is 18 s since (IERS Bulletin C 52).
+    assert [str(t) for t in exact.table.index] == [
+        f"2017-01-01 00:00:{second}" for second in (16, 17, 18)
+    ]
+    assert not any(f.code in ("E02", "E10") for f in exact.meta.findings)
+
+
+def test_a_second_60_where_utc_has_none_proves_nothing(tmp_path: Path) -> None:
+    recording = read(tmp_path, f"time,hpl\n{T}6,9.0\n{T[:-4]}09:60.0,9.1\n{T}7,9.2\n")
+    assert len(recording.table) == 2
+    found = {f.code: f for f in recording.meta.findings}
+    assert "E02" not in found
+    assert found["E10"].evidence == "a second 60, and the times are GPST"
+
+
+def test_a_line_lost_to_nul_bytes_is_named_so(tmp_path: Path) -> None:
+    path = tmp_path / "nul.csv"
+    path.write_bytes(f"time,hpl\n{T}6,9.0\n{T}7,\0\0\0\n{T}8,9.2\n".encode())
+    found = {f.code: f for f in delimited_text.read(path).meta.findings}
+    assert found["E10"].evidence == "lines with NUL bytes"
+
+
+def test_lines_that_do_not_fit_the_header_are_shown(tmp_path: Path) -> None:
+    text = "time,lat,lon\n" + "".join(f"{T}{i},50.5,15.5\nstatus ok\n" for i in range(9))
+    with pytest.raises(InputError, match="another number of fields") as caught:
+        read(tmp_path, text)
+    assert caught.value.evidence == (
+        "9 of the first 18 lines; fields of the header 3, of line 3 1: status ok"
+    )
+
+
+@pytest.mark.parametrize(
+    "names", [("lat_dir", "lon_dir"), ("ns", "ew"), ("N/S", "E/W"), ("lat_hem", "Longitude Ref")]
+)
+def test_letters_of_hemispheres_give_the_sign(tmp_path: Path, names: tuple[str, str]) -> None:
+    text = f"time,lat,{names[0]},lon,{names[1]},hpl\n{T}6,33.5,S,70.25,W,9\n{T}7,33.6,n,70.5,E,9\n"
+    recording = read(tmp_path, text)
+    assert recording.table["lat_deg"].tolist() == [-33.5, 33.6]
+    assert recording.table["lon_deg"].tolist() == [-70.25, 70.5]
+    assert [f.evidence for f in recording.meta.findings if f.code == "E26"] == [
+        "lat_deg N 1, lat_deg S 1, lon_deg E 1, lon_deg W 1"
+    ]
+    assert read(tmp_path, text, columns=["lat_deg"]).table["lat_deg"].tolist() == [-33.5, 33.6]
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ("-33.5,S", "sign beside a letter"),
+        ("-33.5,N", "sign beside a letter"),
+        ("33.5,", "no letter"),
+        ("33.5,E", "no letter"),
+    ],
+)
+def test_letters_that_contradict_are_refused(tmp_path: Path, row: str, words: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        read(tmp_path, f"time,lat,lat_dir,lon\n{T}6,{row},15.5\n")
+    assert "first -33.5" in caught.value.evidence or "first 33.5" in caught.value.evidence
+
+
+def test_ns_alone_are_satellites(tmp_path: Path) -> None:
+    assert one(tmp_path, "ns", "9").tolist() == [9]
+
+
+@pytest.mark.parametrize(
+    "names", ["x,y,z", "ecef_x,ecef_y,ecef_z", "X-ECEF (m),Y-ECEF (m),Z-ECEF (m)"]
+)
+def test_earth_fixed_coordinates_are_positions(tmp_path: Path, names: str) -> None:
+    # Equator at 90 degrees east, the pole, 100 m up: semi-axes of WGS 84 (NIMA TR8350.2).
+    rows = ["0,6378237,0", "0,0,6356852.3142", "0,0,0", "3950000.1,1115000.2,4865000.3"]
+    text = f"time,{names},hpl\n" + "".join(
+        f"{T}{6 + i % 4},{r},9\n" for i, r in enumerate(rows * 50)
+    )
+    recording = read(tmp_path, text)
+    table = recording.table
+    np.testing.assert_allclose(table["lat_deg"].iloc[:2], [0, 90], atol=1e-12)
+    assert table["lon_deg"].iloc[0] == 90
+    np.testing.assert_allclose(table["height_m"].iloc[:2], 100, atol=1e-4)
+    assert table["lat_deg"].isna().tolist()[:4] == [False, False, True, False]
+    assert [f.evidence for f in recording.meta.findings if f.code == "E26"] == [
+        "150 positions, 50 of (0, 0, 0) missing"
+    ]
+    assert not any(name.startswith("x_") for name in table)
+    only = read(tmp_path, text, columns=["lat_deg"]).table
+    pd.testing.assert_series_equal(only["lat_deg"], table["lat_deg"])
+
+
+def test_local_coordinates_are_no_positions(tmp_path: Path) -> None:
+    recording = read(tmp_path, f"time,x,y,z,hpl\n{T}6,1.5,2.5,3.5,9\n{T}7,1.5,2.5,3.5,9\n")
+    assert recording.table["lat_deg"].isna().all()
+    assert [f.severity for f in recording.meta.findings if f.code == "E10"] == ["warning"]
+    beside = read(tmp_path, f"time,x,y,z,lat,lon\n{T}6,1.5,2.5,3.5,50,15\n").table
+    assert beside["x_y"].tolist() == [2.5]

@@ -269,6 +269,14 @@ def test_other_separators_and_line_ends(tmp_path: Path, separator: str) -> None:
     assert recording.table["lat_deg"].tolist() == [47.530299305]
 
 
+def test_line_ends_of_old_macs_are_recognised(tmp_path: Path) -> None:
+    text = (FRAME + LEVELS + ROW + "  27.30   45.5\n").replace("\n", "\r").encode()
+    assert rtklib_pos.sniff(text, text, text, tmp_path / "roof.pos").score == 95
+    recording = read(tmp_path, text.decode())
+    assert recording.table["hpl_m"].tolist() == [27.30]
+    assert codes(recording) == [("E19", "info")]
+
+
 def test_a_cut_last_line_never_becomes_a_figure(tmp_path: Path) -> None:
     whole = [ROW.replace(":13.", f":{s}.") + "  27.30   45.5" for s in range(10, 60)]
     text = FRAME + LEVELS + "\n".join(whole)
@@ -308,7 +316,7 @@ def test_no_header_and_no_rows(tmp_path: Path) -> None:
         read(tmp_path, ROW + "  27.30   45.5\n")
     with pytest.raises(InputError, match="E15"):
         read(tmp_path, FRAME + LEVELS)
-    with pytest.raises(InputError, match="no line"):
+    with pytest.raises(InputError, match="E10: no line"):
         read(tmp_path, FRAME + LEVELS + "2016/07/12 12:02:13.000 1 2 3\n")
 
 
