@@ -14,10 +14,10 @@ import sbas
 PACKAGE = Path(sbas.__file__).parent
 
 LAYERS = (
-    "version", "numerals", "exceptions", "findings", "timescales", "estimate", "recording", "satellite_table",
-    "bundled", "streaming", "recording_survey", "frames", "track", "truth", "environment_labels", "input_check",
-    "logs", "rinex", "augmentation", "positioning", "monitoring", "laboratory",
-    "integrity", "dependability", "plots", "reporting", "cli",
+    "version", "numerals", "exceptions", "findings", "timescales", "estimate", "recording",
+    "satellite_table", "bundled", "streaming", "recording_survey", "frames", "track", "truth",
+    "environment_labels", "input_check", "logs", "rinex", "augmentation", "positioning",
+    "monitoring", "laboratory", "integrity", "dependability", "plots", "reporting", "cli",
 )  # fmt: skip
 """From the ground up: a module imports only from its own layer and those before it."""
 
