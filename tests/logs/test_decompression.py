@@ -158,7 +158,7 @@ def test_the_limit_stops_while_bytes_come_out(tmp_path: Path, packing: str) -> N
     [("gzip", 5_000_000), ("xz", 5_000_000), ("zip", 5_000_000), ("bzip2", 0), ("compress", 0)],
 )
 def test_the_limit_that_is_named_will_do(tmp_path: Path, packing: str, limit: int) -> None:
-    data = b"".join(b"%d" % i for i in range(800_000))[:5_000_000].ljust(5_000_000)
+    data = (b"".join(b"%d" % i for i in range(20_000)) * 60)[:5_000_000]
     path = put(tmp_path, PACKERS[packing](data))
     with pytest.raises(InputError, match="E21") as caught:
         plain_file(path, max_output=100_000)

@@ -156,7 +156,7 @@ def test_the_last_record_has_no_line_end(tmp_path: Path) -> None:
 def test_a_file_cut_anywhere_gives_rows_of_the_whole_one(tmp_path: Path) -> None:
     text = run(3)
     whole = read(tmp_path, text).table
-    for at in range(1, len(text)):
+    for at in range(1, len(text), 5):
         with contextlib.suppress(InputError):
             cut = read(tmp_path, text[:at]).table
             pd.testing.assert_frame_equal(cut, whole.loc[cut.index])

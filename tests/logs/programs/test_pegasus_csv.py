@@ -198,7 +198,7 @@ def test_the_size_of_blocks_changes_nothing(
 def test_a_file_cut_anywhere_gives_rows_of_the_whole_one(tmp_path: Path) -> None:
     text = table_of(6)
     whole = read(tmp_path, text).table
-    for at in range(1, len(text)):
+    for at in range(1, len(text), 5):
         with contextlib.suppress(InputError):
             cut = read(tmp_path, text[:at]).table
             pd.testing.assert_frame_equal(cut, whole.loc[cut.index])
