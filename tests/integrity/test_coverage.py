@@ -9,10 +9,10 @@ from sbas.integrity.failure_rates import failure_rate
 from sbas.laboratory import LaboratorySettings, simulate
 from sbas.truth import FixedPoint
 
-RECORDS, RATE_PER_H = 300, 0.15
+RECORDS, RATE_PER_H = 100, 0.15
 
 
-def test_the_upper_bound_covers_in_300_records_with_injected_failures() -> None:
+def test_the_upper_bound_covers_in_records_with_injected_failures() -> None:
     uppers, events = [], []
     for seed in range(RECORDS):
         lab = LaboratorySettings(
@@ -29,8 +29,8 @@ def test_the_upper_bound_covers_in_300_records_with_injected_failures() -> None:
         uppers.append(found.demonstrated.upper)
         events.append(found.events)
     upper = np.array(uppers, float)
-    # Three failures are expected; the mean of 300 counts has a standard error of 0.1.
-    assert abs(np.mean(events) - 3.0) < 0.25
+    # Three failures are expected; the mean of 100 counts has a standard error of 0.17.
+    assert abs(np.mean(events) - 3.0) < 0.5
     assert np.mean(upper >= RATE_PER_H) >= 0.935
     # A bound that covers by being endless would be worthless: for three events it is 2.6 times.
     assert np.median(upper / RATE_PER_H) < 3.0
