@@ -39,7 +39,9 @@ def protect_files(
     out: Annotated[Path, typer.Option(help="Recording to write: .parquet.")],
     mode: Annotated[
         Literal["pa", "npa", "auto"],
-        typer.Option(help="Precision approach, non-precision approach, or auto: PA where it has a fix."),
+        typer.Option(
+            help="Precision approach, non-precision approach, or auto: PA where it has a fix."
+        ),
     ] = "pa",
     profile: Annotated[
         Literal["mops", "glab"], typer.Option(help="As DO-229 has it, or as gLAB 6.0.0 does.")
