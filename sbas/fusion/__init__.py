@@ -1,0 +1,1 @@
+"""Causal analysis of multisensor positioning: which sensor faults matter, and how fast."""
