@@ -56,30 +56,6 @@ def _judged(
     return CovarianceAt(row, expired, ~none & instants.expired(stamp, SLOW_TIMEOUT_S["pa"]))
 
 
-def covariance_at(
-    messages: ClockEphemerisCovariances,
-    issues: tuple[tuple[Ints, Ints], ...],
-    instants: Instants,
-    *,
-    mode: Mode,
-) -> CovarianceAt:
-    """The newest covariance of a satellite.
-
-    Parameters
-    ----------
-    issues : (issue of mask, position), (n,) each, of the current and of the previous mask.
-    """
-    row = np.full(instants.second.size, NONE)
-    for iodp, position in issues:
-        for (issue, place), here in row_groups(iodp, position):
-            own = np.flatnonzero((messages.iodp == issue) & (messages.position == place))
-            if place < 0 or not own.size:
-                continue
-            at = instants.some(here).latest(messages.time_s[own])
-            row[here] = np.maximum(row[here], np.where(at >= 0, own[at], NONE))
-    return _judged(messages, row, instants, mode)
-
-
 def covariance_factor(
     messages: ClockEphemerisCovariances,
     row: Ints,

@@ -14,7 +14,6 @@ from sbas.augmentation.degradation import DegradationAt
 from sbas.augmentation.message_types import LongTermCorrections
 from sbas.augmentation.prn_masks import NONE, MaskTimeline, latest_of_slot
 from sbas.augmentation.reception import Instants
-from sbas.augmentation.row_groups import row_groups
 from sbas.augmentation.tables import SLOTS, SLOW_TIMEOUT_S, Mode
 
 Ints = NDArray[np.int64]
@@ -154,17 +153,3 @@ def outside_interval(since_s: Floats, interval_s: Floats, step_m: Floats, rate: 
     inside = (since_s > 0) & (since_s < interval_s)
     late = np.maximum(0.0, np.maximum(-since_s, since_s - interval_s))
     return np.where(inside, 0.0, step_m + rate * late)
-
-
-def long_term_at(
-    messages: LongTermCorrections, iodp: Ints, position: Ints, instants: Instants, *, mode: Mode
-) -> LongTermAt:
-    """Long-term records of a satellite whose (n,) issue of mask and place in it are given."""
-    row = np.full(instants.second.size, NONE)
-    for (issue, place), here in row_groups(iodp, position):
-        own = np.flatnonzero((messages.iodp == issue) & (messages.position == place))
-        if place < 0 or not own.size:
-            continue
-        at = instants.some(here).latest(messages.time_s[own])
-        row[here] = np.where(at >= 0, own[at], NONE)
-    return _with_the_issue_before(messages, row, last_of_other_issue(messages), instants, mode)

@@ -165,6 +165,15 @@ def raim_files(
     track_azimuth: Annotated[
         float | None, typer.Option(help="Azimuth of a track: levels along and across it.")
     ] = None,
+    araim: Annotated[
+        bool, typer.Option("--araim", help="Levels of ARAIM too, with the priors below.")
+    ] = False,
+    prior_satellite: Annotated[
+        float, typer.Option(help="ARAIM: prior of a fault of one satellite.")
+    ] = 1e-5,
+    prior_constellation: Annotated[
+        float, typer.Option(help="ARAIM: prior of a fault of a whole constellation.")
+    ] = 1e-4,
     out: Annotated[
         Path | None, typer.Option(help="Write the recording with its RAIM flags: .parquet.")
     ] = None,
@@ -175,7 +184,12 @@ def raim_files(
 
     Example:  sbas raim --obs a.obs --nav a.nav --messages a.ems --geo 123
     """
-    from sbas.monitoring import raim, with_raim_flags  # loaded only where it is used
+    from sbas.monitoring import (  # loaded only where it is used
+        AraimSettings,
+        araim_of_recording,
+        raim,
+        with_raim_flags,
+    )
     from sbas.positioning import protect, unaugmented
 
     inputs = [*obs, *nav, *(messages or ())]
@@ -199,13 +213,23 @@ def raim_files(
             missed_detection=missed_detection,
             track_azimuth_deg=track_azimuth,
         )
+        advanced = None
+        if araim:
+            settings = AraimSettings(
+                p_satellite=prior_satellite, p_constellation=prior_constellation
+            )
+            advanced = araim_of_recording(recording, settings=settings, heading_deg=track_azimuth)
     if out is not None:
         write_recording(out, [with_raim_flags(recording, result)])
     if json:
-        output.print_json({**result.to_dict(), "file": None if out is None else str(out)})
+        answer = {**result.to_dict(), "file": None if out is None else str(out)}
+        if advanced is not None:
+            answer["araim"] = advanced.to_dict()
+        output.print_json(answer)
     else:
         print(result)
-        output.print_findings(result.findings)
+        if advanced is not None:
+            print(advanced)
 
 
 def _place(text: str | None) -> tuple[float, float, float] | None:

@@ -6,6 +6,7 @@ from sbas.monitoring.araim_settings import AraimSettings
 from sbas.monitoring.level_comparison import raim_against_sbas
 from sbas.monitoring.range_faults import injected_faults
 from sbas.monitoring.receiver_flags import with_raim_flags
+from sbas.monitoring.recorded_araim import araim_of_recording
 from sbas.monitoring.recording_monitor import raim
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "AraimSettings",
     "araim_levels",
     "araim_modes",
+    "araim_of_recording",
     "injected_faults",
     "raim",
     "raim_against_sbas",

@@ -34,6 +34,7 @@ from sbas.monitoring.araim_modes import (
 from sbas.monitoring.araim_roots import level_of_risk
 from sbas.monitoring.araim_settings import AraimSettings, by_constellation
 from sbas.monitoring.normal_equations import GeometryReason, RangeReason
+from sbas.monitoring.raim_result import spread_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.integer[Any]]
@@ -46,7 +47,7 @@ _ELEMENTS = 1 << 19
 """Of the largest array at a time: enough to keep numpy busy, a few megabytes each."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AraimResult:
     """Levels of n epochs on q axes; infinite where there is none.
 
@@ -104,8 +105,13 @@ class AraimResult:
 
     @property
     def available(self) -> Bools:
-        """(n,) there is a horizontal level."""
-        return np.isfinite(self.hpl_m)
+        """(n,) there is a horizontal level, and no separation test says that it means nothing."""
+        return np.isfinite(self.hpl_m) & ~self.detected
+
+    @property
+    def detected(self) -> Bools:
+        """(n,) a solution separation reached its threshold; False without residuals."""
+        return self.alarm_ratio >= 1
 
     @property
     def reasons(self) -> list[str]:
@@ -120,6 +126,44 @@ class AraimResult:
                      "faults", "modes", "modes_not_monitored"):  # fmt: skip
             columns[name] = getattr(self, name)
         return pd.DataFrame(columns | {"reason": self.reasons})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON: levels over available epochs, and why the others have none."""
+        levels = {"hpl_m": self.hpl_m, "vpl_m": self.vpl_m}
+        levels |= {f"pl_{axis}_m": self.on(axis) for axis in self.axes[3:]}
+        codes, counts = np.unique(self.reason[self.reason > 0], return_counts=True)
+        settings = {
+            name: dict(value) if isinstance(value, Mapping) else value
+            for name, value in vars(self.settings).items()
+        }
+        return {
+            "epochs": int(self.reason.size),
+            "available": int(self.available.sum()),
+            "detected": int(self.detected.sum()),
+            **{name: spread_of(values[self.available]) for name, values in levels.items()},
+            "emt_m": spread_of(self.emt_m[self.available]),
+            "reasons": {
+                reason_words(int(code)): int(n) for code, n in zip(codes, counts, strict=True)
+            },
+            "ranges_left_out": dict(self.ranges_left_out),
+            "settings": settings,
+        }
+
+    def __repr__(self) -> str:
+        plain = self.to_dict()
+        lines = [
+            f"ARAIM of {plain['epochs']:,} epochs: {plain['available']:,} available, "
+            f"{plain['detected']:,} with a fault detected",
+            f"  priors: satellite {self.settings.p_satellite}, constellation "
+            f"{self.settings.p_constellation}; budgets {self.settings.phmi_v:g} up, "
+            f"{self.settings.phmi_h:g} horizontally",
+        ]
+        for name, spread in plain.items():
+            if name.endswith("_m") and spread["median"] is not None:
+                lines.append(f"  {name:24s}median {spread['median']:.4g}, 95 % {spread['p95']:.4g}")
+        lines += [f"  no level: {words}: {n:,}" for words, n in plain["reasons"].items()]
+        lines += [f"  ranges left out: {w}: {n:,}" for w, n in self.ranges_left_out.items()]
+        return "\n".join(lines)
 
 
 def reason_words(code: int) -> str:

@@ -84,7 +84,7 @@ class RaimResult:
         """Plain values for JSON; infinite levels are counted, not written."""
         n = len(self.epochs)
         levels = {
-            name: _spread(self.epochs[name].to_numpy())
+            name: spread_of(self.epochs[name].to_numpy())
             for name in LEVEL_NAMES
             if name in self.epochs.columns
         }
@@ -119,15 +119,15 @@ class RaimResult:
         lines += [f"    {words}: {count:,}" for words, count in self.reasons().items()]
         for name in LEVEL_NAMES:
             if name in self.epochs.columns:
-                spread = _spread(self.epochs[name].to_numpy())
+                spread = spread_of(self.epochs[name].to_numpy())
                 if spread["median"] is not None:
                     text = f"median {spread['median']:.4g}, 95 % {spread['p95']:.4g}"
                     lines.append(f"  {name:24s}{text} ({spread['epochs']:,} epochs)")
-        lines += [f"  {f.code} {f.severity}: {f.message}" for f in self.findings]
+        lines += [str(finding) for finding in self.findings]
         return "\n".join(lines)
 
 
-def _spread(values: Floats) -> dict[str, Any]:
+def spread_of(values: Floats) -> dict[str, Any]:
     """Order statistics of finite levels, and how many are infinite; None where there is none."""
     finite = values[np.isfinite(values)]
     figures: dict[str, Any] = {

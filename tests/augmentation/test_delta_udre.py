@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sbas.augmentation.delta_udre import covariance_at, covariance_factor
+from sbas.augmentation.delta_udre import covariance_factor
 from sbas.augmentation.tables import Mode
 from sbas.augmentation.timeline import CorrectionTimeline, correction_timeline
 from tests.augmentation import encoding as enc
@@ -68,11 +68,6 @@ def test_the_covariance_of_the_old_mask_serves_until_that_of_the_new_comes() -> 
     instants = line.reception.instants(enc.epochs_ns(19, 21, 31))
     assert line.covariance(3, instants, mode="pa").row.tolist() == [0, 0, 1]
     assert line.covariance(1, instants, mode="pa").row.tolist() == [-1, -1, -1]
-    # By issue and place, as the two masks number the satellite.
-    n = np.zeros(3, np.int64)
-    both = ((n + 1, n + 1), (n, n))
-    found = covariance_at(line.decoded.covariances, both, instants, mode="pa")
-    assert found.row.tolist() == [0, 0, 1]
 
 
 def test_without_type_28_there_is_no_covariance() -> None:

@@ -73,6 +73,19 @@ def test_raim_of_the_same_epochs(
     assert Answer(capsys, "raim", *arguments[:8]).code == 2  # messages without --geo
 
 
+def test_araim_of_one_constellation_asks_for_a_rare_constellation_fault(
+    arguments: tuple[object, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    usual = Answer(capsys, "raim", *arguments, "--araim", "--json").json["araim"]
+    assert usual["available"] == 0
+    assert usual["reasons"]["faults that cannot be monitored exhaust the integrity budget"] > 300
+    rare = Answer(
+        capsys, "raim", *arguments, "--araim", "--prior-constellation", "1e-12", "--json"
+    ).json["araim"]
+    assert rare["available"] > 200
+    assert rare["hpl_m"]["median"] > 10
+
+
 def test_help_names_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     answer = Answer(capsys, "protect", "--help")
     assert "Example:" in answer.out
