@@ -3,7 +3,8 @@
 The questions are functions: `read` a recording, `check` it, `evaluate` it against a truth,
 ask for its `failure_rate`, its `decorrelation` or a `k_factor`, `compare` two receivers,
 `simulate` a laboratory and write a `report`; `receiver_states` of a recording feed a fault
-tree, which says how far one may `depend` on a localisation unit.
+tree, which says how far one may `depend` on a localisation unit; `multisensor` says which faults
+of which sensors spoil the position of an architecture, and how fast.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from sbas.version import __version__
 if TYPE_CHECKING:
     from sbas.augmentation import read_messages
     from sbas.dependability import depend, load_models, receiver_states
+    from sbas.fusion import load_architecture, multisensor
     from sbas.integrity import (
         compare,
         decorrelation,
@@ -74,9 +76,11 @@ __all__ = [
     "label_epochs",
     "levels_from_satellites",
     "load_allocation",
+    "load_architecture",
     "load_models",
     "load_segments",
     "load_track",
+    "multisensor",
     "plan_hours",
     "position_errors",
     "protect",
@@ -109,6 +113,7 @@ _LATER = {
         "sbas.integrity",
     ),
     **dict.fromkeys(("depend", "load_models", "receiver_states"), "sbas.dependability"),
+    **dict.fromkeys(("load_architecture", "multisensor"), "sbas.fusion"),
     "read_messages": "sbas.augmentation",
     **dict.fromkeys(
         ("levels_from_satellites", "protect", "stanford_esa", "unaugmented"), "sbas.positioning"

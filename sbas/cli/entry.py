@@ -24,6 +24,7 @@ VERBS = {
     **dict.fromkeys(("kfactor", "plan"), "planning"),
     **dict.fromkeys(("protect", "raim"), "ranges"),
     **dict.fromkeys(("states", "depend"), "localisation"),
+    "multisensor": "sensor_fusion",
 }
 """Verbs by the module that has them: a verb loads what it needs, not what all need."""
 

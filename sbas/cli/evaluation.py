@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich import box
@@ -16,16 +16,22 @@ from sbas.cli.option_groups import with_option_groups
 from sbas.estimate import Estimate, Refusal
 from sbas.exceptions import InputError
 from sbas.integrity.causes.causes import Causes, explain
+from sbas.integrity.epoch_levels import whole_table
 from sbas.integrity.evaluation import evaluate
 from sbas.integrity.failure_rates import FailureRate, failure_rate
 from sbas.integrity.rate_evidence import EVENT_KINDS
 from sbas.integrity.results import Evaluation, EvaluationSettings
 from sbas.numerals import percent, share, upward
-from sbas.recording import EpochSource
+from sbas.recording import EpochSource, Recording
 from sbas.truth import Truth
+
+if TYPE_CHECKING:
+    from sbas.monitoring.level_comparison import LevelComparison
 
 MOST_EXPLAINED = 5_000_000
 """Longer records are not explained in a report: their columns would have to be in memory."""
+
+_RECEIVERS_RAIM = ("hpl_m", "hdop", "herl_m", "verl_m", "flags", "n_sv", "mode")
 
 _DEFAULTS = EvaluationSettings()
 
@@ -89,7 +95,12 @@ def evaluate_files(
         from sbas.reporting import report as write_report  # drawing is loaded only where used
 
         causes = likely_causes(opened.source, result, truth=opened.truth, accept=accept or ())
-        page = write_report(result, report, causes=causes)
+        source = opened.source
+        if result.epochs <= MOST_EXPLAINED and any(file.suffix == ".parquet" for file in files):
+            # Only a recording read whole has the table of the satellites that RAIM needs.
+            again = inputs.open_recording(files, truth, reading, repairing, quiet=True, whole=True)
+            source = again.source
+        page = write_report(result, report, causes=causes, raim=range_monitoring(source, result))
     if json:
         output.print_json({**result.to_dict(), "report": None if page is None else str(page)})
         return
@@ -109,6 +120,27 @@ def likely_causes(
         )
     try:
         return explain(source, truth=truth, accept_findings=accept)
+    except InputError as error:
+        return Refusal(error.what, error.cure)
+
+
+def range_monitoring(source: EpochSource, result: Evaluation) -> LevelComparison | Refusal | None:
+    """RAIM beside SBAS on a recording that was evaluated; None where it says nothing of RAIM."""
+    from sbas.monitoring.level_comparison import raim_against_sbas  # loaded only where used
+    from sbas.monitoring.recorded_ranges import has_ranges
+
+    ranges = isinstance(source, Recording) and has_ranges(source)
+    if not ranges and "herl_m" not in source.columns:
+        return None
+    if result.epochs > MOST_EXPLAINED:
+        return Refusal(
+            f"{result.epochs:,} epochs are more than {MOST_EXPLAINED:,}",
+            "give parts of the record to sbas.raim_against_sbas",
+        )
+    if not isinstance(source, Recording):
+        source = Recording(whole_table(source, _RECEIVERS_RAIM), source.meta)
+    try:
+        return raim_against_sbas(source)
     except InputError as error:
         return Refusal(error.what, error.cure)
 

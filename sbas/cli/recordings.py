@@ -172,7 +172,7 @@ def demo(
     Example:  sbas demo --out demo
     """
     # Analyses and drawing are loaded only where they are used.
-    from sbas.cli.evaluation import likely_causes, print_verdict
+    from sbas.cli.evaluation import likely_causes, print_verdict, range_monitoring
     from sbas.integrity.evaluation import evaluate
     from sbas.laboratory import bundled_settings
     from sbas.reporting import report
@@ -188,7 +188,8 @@ def demo(
     with output.progress("evaluating", quiet) as callback:
         evaluation = evaluate(source, truth=truth, progress=callback)
     causes = likely_causes(source, evaluation, truth=truth)
-    page = report(evaluation, out / "report.html", causes=causes)
+    monitored = range_monitoring(source, evaluation)
+    page = report(evaluation, out / "report.html", causes=causes, raim=monitored)
     if json:
         output.print_json({"report": str(page), "recording": str(recording)})
         return

@@ -11,6 +11,7 @@ from sbas.estimate import Refusal
 from sbas.exceptions import InputError
 from sbas.integrity.causes.causes import Causes
 from sbas.integrity.results import Evaluation
+from sbas.monitoring.level_comparison import LevelComparison
 from sbas.numerals import count, hours, stamp
 from sbas.reporting.content import Section
 from sbas.reporting.sections import (
@@ -26,6 +27,7 @@ from sbas.reporting.sections import (
     method_trace,
     parameters,
     pictures,
+    range_monitoring,
     results,
     verdict,
 )  # fmt: skip
@@ -66,7 +68,12 @@ class Report:
         }
 
 
-def report_of(evaluation: Evaluation, *, causes: Causes | Refusal = NOT_EXPLAINED) -> Report:
+def report_of(
+    evaluation: Evaluation,
+    *,
+    causes: Causes | Refusal = NOT_EXPLAINED,
+    raim: LevelComparison | Refusal | None = None,
+) -> Report:
     """The report of an evaluation as data, pictures drawn."""
     names = [PurePath(source.path).name or source.path for source in evaluation.meta.sources]
     title = ", ".join(names[:2]) or "recording without a file"
@@ -81,6 +88,8 @@ def report_of(evaluation: Evaluation, *, causes: Causes | Refusal = NOT_EXPLAINE
     sections.insert(_after("events", sections), likely_causes.section(causes))
     if evaluation.environments:
         sections.insert(_after("figures", sections), environments.section(evaluation))
+    if raim is not None:
+        sections.insert(_after("pictures", sections), range_monitoring.section(raim))
     return Report(title, subtitle, tuple(sections))
 
 
@@ -108,6 +117,7 @@ def report(
     path: str | os.PathLike[str],
     *,
     causes: Causes | Refusal = NOT_EXPLAINED,
+    raim: LevelComparison | Refusal | None = None,
 ) -> Path:
     """Write the report of an evaluation as one self-contained HTML file.
 
@@ -116,6 +126,8 @@ def report(
     evaluation : result of `sbas.evaluate`.
     path : the file to write; one that exists is replaced.
     causes : result of `sbas.explain` for the same recording.
+    raim : result of `sbas.raim_against_sbas` for the same recording; without it the report has no
+        section on RAIM.
 
     Returns
     -------
@@ -125,7 +137,7 @@ def report(
     ------
     InputError : the file cannot be written.
     """
-    return write_page(report_of(evaluation, causes=causes), path)
+    return write_page(report_of(evaluation, causes=causes, raim=raim), path)
 
 
 def write_page(document: Report, path: str | os.PathLike[str]) -> Path:

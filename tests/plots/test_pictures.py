@@ -21,10 +21,12 @@ from sbas.integrity.results import Evaluation
 from tests.plots.synthetic import KINDS, TRUTH, evaluated, synthetic_recording
 
 OF_OTHER_RESULTS = {
-    "architecture_ladder", "decorrelation_curve", "ground_plan", "importance_bars", "k_curve",
-    "level_lines", "message_timeline", "pair_strips", "probability_curve", "sky",
-    "sojourn_survival", "state_ribbon", "tail_plot", "threshold_stability", "tree_picture",
-    "variance_budget",
+    "architecture_ladder", "combination_ribbon", "decision_tree", "decorrelation_curve",
+    "ground_plan", "importance_bars", "incidence_curve", "k_curve", "level_lines",
+    "message_timeline", "pair_strips", "probability_curve", "raim_availability",
+    "raim_level_ratios", "raim_levels",
+    "range_faults", "sensitivity_bars", "sky", "sojourn_survival", "state_importance_bars",
+    "state_ribbon", "tail_plot", "threshold_stability", "tree_picture", "variance_budget",
 }  # fmt: skip
 """Drawn from results of their own; tested beside them."""
 PICTURES = [name for name in sbas.plots.__all__ if name not in OF_OTHER_RESULTS]

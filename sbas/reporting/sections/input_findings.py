@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from sbas.dependability.questions import Dependability
+from sbas.fusion.causal_analysis import CausalAnalysis
 from sbas.integrity.results import Evaluation
 from sbas.reporting.content import Cell, Section, Tone, table
 
 _TONES: dict[str, Tone] = {"error": "bad", "warning": "warning", "info": ""}
 
 
-def section(evaluation: Evaluation | Dependability) -> Section:
+def section(evaluation: Evaluation | Dependability | CausalAnalysis) -> Section:
     """Every finding of reader, input check and evaluation, or of the check of models."""
     rows: list[tuple[Cell | str, ...]] = [
         (

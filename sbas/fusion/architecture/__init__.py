@@ -1,0 +1,1 @@
+"""Sensor architectures as data: files, checks, presets."""

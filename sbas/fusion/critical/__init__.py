@@ -1,0 +1,1 @@
+"""Episodes of combinations, competing risks, critical times."""

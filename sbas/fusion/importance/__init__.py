@@ -1,0 +1,1 @@
+"""Which sensor and which parameter the output hangs on."""

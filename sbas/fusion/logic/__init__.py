@@ -1,0 +1,1 @@
+"""Truth tables of sensor states, their Boolean forms, and the published ones."""

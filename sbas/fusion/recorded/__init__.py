@@ -1,0 +1,1 @@
+"""Recordings as sensors, and states as events of a fault tree."""

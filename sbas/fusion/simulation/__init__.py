@@ -1,0 +1,1 @@
+"""Runs of an architecture: sensors drawn, missing data treated, fused."""
