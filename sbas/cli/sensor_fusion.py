@@ -67,10 +67,8 @@ def multisensor_files(
     """
     from sbas.fusion import architecture_text, load_architecture, multisensor
 
-    given = [Path(model), *(recording or ())]
-    for out in (tree, report):
-        if out is not None:
-            inputs.refuse_to_overwrite(out, given)
+    _check_outputs(tree, report, [model, *(recording or ()), truth.truth, truth.track,
+                                  truth.environments])  # fmt: skip
     architecture = load_architecture(model)
     if describe:
         if json:
@@ -85,17 +83,20 @@ def multisensor_files(
         opened = inputs.open_recording(
             recording, truth, reading, repairing, quiet=quiet, whole=True
         )
-    elif truth.truth is not None or azimuth is not None:
+    elif (azimuth, direction_above) != (None, None) or truth != inputs.TruthGiven():
         raise InputError(
-            "a truth or azimuth without a recording", cure="--recording FILE --truth LAT,LON,H"
+            "a truth, track or direction without a recording",
+            cure="--recording FILE --truth LAT,LON,H --azimuth DEGREES",
         )
     source = None if opened is None else opened.source
+    # A source that streams would leave the receiver to its model, unseen.
+    assert source is None or isinstance(source, Recording)
     with output.progress("simulating", quiet) as callback:
         found = multisensor(
             architecture,
             runs=runs,
             seed=seed,
-            recording=source if isinstance(source, Recording) else None,
+            recording=source,
             truth=None if opened is None else opened.truth,
             track=None if opened is None else opened.track,
             azimuth_deg=azimuth,
@@ -121,6 +122,21 @@ def multisensor_files(
     for name, path in files.items():
         if path is not None:
             print(f"{name}  {path}")
+
+
+def _check_outputs(tree: Path | None, report: Path | None, given: list[Path | str | None]) -> None:
+    """Refuse before a long simulation what could not be written, or not be read again, after it."""
+    for out in (tree, report):
+        if out is not None:
+            inputs.refuse_to_overwrite(out, given)
+    if tree is not None and tree.suffix != ".json":
+        raise InputError(
+            "sbas depend knows a fault tree by its ending", where=f"--tree {tree}",
+            cure=f"--tree {tree.with_suffix('.json')}",
+        )  # fmt: skip
+    if tree is not None and tree == report:
+        raise InputError("fault tree and report in one file", where=str(tree),
+                         cure="name two files")  # fmt: skip
 
 
 def _write_tree(found: CausalAnalysis, path: Path) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from sbas.dependability.tree.model import HybridFaultTree
 from sbas.exceptions import InputError
@@ -67,13 +67,13 @@ class CausalAnalysis:
 
     @property
     def time_to_alert_s(self) -> float | None:
-        """Shortest `reach_q05_s` of the critical combinations [s]: within it an alert must come.
+        """Shortest `reach_q05_s` of all combinations [s]: within it an alert must come.
 
-        0 where one of them is unacceptable at entry in 5 % of its episodes; None without critical
-        combinations. Source: Railways 2014, section 4 (the critical time as a time to alarm).
+        0 where one is in the target state at entry in 5 % of its episodes, critical or not: that
+        it gets no worse later leaves no more time. None where no combination is seen to get there.
+        Source: Railways 2014, section 4 (the critical time as a time to alarm).
         """
-        rows = self.critical.table.loc[list(self.critical.critical), "reach_q05_s"]
-        known = [float(time) for time in rows if math.isfinite(time)]
+        known = [float(t) for t in self.critical.table["reach_q05_s"] if math.isfinite(t)]
         return min(known) if known else None
 
     @property
@@ -173,6 +173,7 @@ class CausalAnalysis:
             f"{self.architecture.name}: {self.runs.runs:,} runs of "
             f"{self.architecture.duration_s:g} s, step {self.runs.step_s:g} s, seed {self.seed}; "
             "modelled",
+            *self._recorded_line(),
             f"  output N {out.nominal / out.epochs:.4f}, DA {out.degraded / out.epochs:.4f}, "
             f"U {out.unacceptable / out.epochs:.4f}, no data {out.no_data / out.epochs:.4f}",
             f"  available {out.available:.4f}, safe {out.safe:.4f}, hazard {out.hazard:.4f}",
@@ -183,12 +184,23 @@ class CausalAnalysis:
         for name in found.critical:
             row = found.table.loc[name]
             lines.append(
-                f"    {name}: reaches U in {row['incidence']:.3f} [{row['incidence_lower']:.3f}, "
-                f"{row['incidence_upper']:.3f}], median {row['event_median_s']:.4g} s; U at "
-                f"entry {row['p_u_at_entry' if found.target == 'U' else 'p_da_at_entry']:.3f}"
+                f"    {name}: reaches {found.target} in {row['incidence']:.3f} "
+                f"[{row['incidence_lower']:.3f}, {row['incidence_upper']:.3f}], median "
+                f"{row['event_median_s']:.4g} s; {found.target} at entry "
+                f"{row[f'p_{found.target.lower()}_at_entry']:.3f}"
             )
         lines += [str(finding) for finding in self.findings]
         return "\n".join(lines)
+
+    def _recorded_line(self) -> Iterator[str]:
+        if self.recorded is None or self.resampled is None:
+            return
+        files = ", ".join(str(source.get("path", "")) for source in self.recorded.sources)
+        yield (
+            f"  receiver: errors along the track of {files or 'a recording'}, "
+            f"{self.resampled.kind.replace('_', ' ')}; U {self.resampled.recorded_u_share:.4f} "
+            f"recorded, {self.resampled.drawn_u_share:.4f} drawn"
+        )
 
 
 def multisensor(
@@ -229,7 +241,8 @@ def multisensor(
     Raises
     ------
     ModelError : a model that cannot be simulated, such as one with a sensor without error model.
-    InputError : too few runs, or a recording whose errors have no sign.
+    InputError : too few runs, a recording whose errors have no sign, or what belongs to a
+        recording without one.
 
     References
     ----------
@@ -237,7 +250,21 @@ def multisensor(
     """
     architecture = model if isinstance(model, Architecture) else load_architecture(model)
     if runs < LEAST_RUNS:
-        raise InputError("intervals need several runs", where="runs", evidence=f"{runs}")
+        raise InputError("intervals need several runs", where="runs", evidence=f"{runs}",
+                         cure=f"runs={LEAST_RUNS} or more, better thousands")  # fmt: skip
+    if resampling not in get_args(Resampling):
+        raise InputError("unknown resampling", where="resampling", evidence=repr(resampling),
+                         cure=" or ".join(get_args(Resampling)))  # fmt: skip
+    of_recording = {
+        "truth": truth, "track": track, "azimuth_deg": azimuth_deg,
+        "direction_above_mps": direction_above_mps, "receiver": receiver,
+    }  # fmt: skip
+    useless = [name for name, value in of_recording.items() if value is not None]
+    if recording is None and useless:
+        raise InputError(
+            f"{', '.join(useless)} without a recording", cure="recording=sbas.read(FILE), or "
+            "leave it out: all sensors are simulated then",
+        )  # fmt: skip
     findings = list(check_architecture(architecture))
     recorded = resampled = None
     sources = {}

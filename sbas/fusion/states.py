@@ -6,6 +6,7 @@ Source: Railways 2014, section 3.1, steps 1 and 2.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -13,17 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbas.exceptions import InputError
-from sbas.findings import Finding
-from sbas.fusion.architecture.model import Thresholds
+from sbas.fusion.architecture.model import MOST_SENSORS, Thresholds
 
 N: Final = 0
 DA: Final = 1
 U: Final = 2
 NO_DATA: Final = -1
 WORDS: Final = {N: "N", DA: "DA", U: "U", NO_DATA: "no data"}
-
-MAX_CODED_SENSORS: Final = 39
-"""3^39 is the last power of three below 2^63."""
+LETTERS: Final = {"N": N, "D": DA, "U": U, "-": NO_DATA}
+"""States in the name of a combination, a letter a sensor."""
+_LETTER_OF: Final = {state: letter for letter, state in LETTERS.items()}
 
 DEFAULT_THRESHOLDS: Final = Thresholds()
 """1 m and 2.5 m: train control on a line of high density."""
@@ -142,30 +142,6 @@ def _hold(states: States, relaxed: States, needed: int) -> None:
         plain[:] = np.where(known, before, NO_DATA)
 
 
-def infinite_errors(error_m: ArrayLike, *, where: str = "") -> tuple[Finding, ...]:
-    """A warning where errors are infinite: they count as U, though nobody measured them.
-
-    Parameters
-    ----------
-    error_m : errors of any shape [m].
-    where : sensor or column, for the finding.
-    """
-    error = np.asarray(error_m, dtype=np.float64)
-    count = int(np.count_nonzero(np.isinf(error)))
-    if count == 0:
-        return ()
-    return (
-        Finding(
-            "E12",
-            "warning",
-            "infinite errors count as unacceptable",
-            where=where,
-            evidence=f"{count} of {error.size} errors",
-            cure="write NaN where there are no data",
-        ),
-    )
-
-
 # --- combinations -----------------------------------------------------------------------------
 
 
@@ -185,9 +161,9 @@ def combination_codes(sensor_state: ArrayLike) -> NDArray[np.int64]:
     InputError : no sensor or more than 39, or a code that is no state.
     """
     state = np.asarray(sensor_state)
-    if state.ndim == 0 or not 1 <= len(state) <= MAX_CODED_SENSORS:
+    if state.ndim == 0 or not 1 <= len(state) <= MOST_SENSORS:
         raise InputError(
-            f"combinations need 1 to {MAX_CODED_SENSORS} sensors along the first axis",
+            f"combinations need 1 to {MOST_SENSORS} sensors along the first axis",
             where="sensor_state",
             evidence=f"shape {state.shape}",
         )
@@ -222,9 +198,9 @@ def combination_states(codes: ArrayLike, sensors: int) -> States:
     ------
     InputError : a number of sensors or a code out of range.
     """
-    if not 1 <= sensors <= MAX_CODED_SENSORS:
+    if not 1 <= sensors <= MOST_SENSORS:
         raise InputError(
-            f"combinations need 1 to {MAX_CODED_SENSORS} sensors",
+            f"combinations need 1 to {MOST_SENSORS} sensors",
             where="sensors",
             evidence=f"{sensors}",
         )
@@ -242,6 +218,11 @@ def combination_states(codes: ArrayLike, sensors: int) -> States:
         rest, digit = np.divmod(rest, 3)
         states[k] = np.where(missing, NO_DATA, digit)
     return states
+
+
+def combination_name(states: Sequence[int]) -> str:
+    """A combination in letters, a letter a sensor, such as "NDU"; see `LETTERS`."""
+    return "".join(_LETTER_OF[state] for state in states)
 
 
 def combination_words(code: int, sensors: int) -> str:

@@ -14,6 +14,9 @@ from sbas.reporting.content import Callout, Cell, Section, Table, Tile, table
 from sbas.reporting.document import Report, write_page
 from sbas.reporting.sections import input_findings, sensor_combinations, sensor_importance
 
+NAMED = 6
+"""Combinations that a sentence names."""
+
 
 def causal_report_of(found: CausalAnalysis) -> Report:
     """The report on an answer of `sbas.multisensor` as data, pictures drawn."""
@@ -55,7 +58,6 @@ def causal_report(found: CausalAnalysis, path: str | os.PathLike[str]) -> Path:
 
 def _verdict(found: CausalAnalysis) -> Section:
     out = found.shares
-    alert = found.time_to_alert_s
     errors = (
         "the receiver's errors are those of a recording, the other sensors' those of error models"
         if found.recorded is not None
@@ -72,15 +74,7 @@ def _verdict(found: CausalAnalysis) -> Section:
                 (
                     f"Nothing here was counted on a train: {errors}. Critical combinations: "
                     f"{critical}.",
-                    "An alert that must come before 5 % of the episodes of any critical "
-                    "combination are unacceptable has "
-                    + (
-                        "no time: some are so at entry."
-                        if alert == 0
-                        else f"{alert:.4g} s."
-                        if alert is not None
-                        else "no critical combination to answer to."
-                    ),
+                    _alert(found),
                 ),
             ),
         ),
@@ -94,6 +88,23 @@ def _verdict(found: CausalAnalysis) -> Section:
         ),
         tables=(_output(found), _hardware(found)),
     )  # fmt: skip
+
+
+def _alert(found: CausalAnalysis) -> str:
+    alert, target = found.time_to_alert_s, found.critical.target
+    if alert is None:
+        return (
+            f"In no combination were 5 % of the episodes seen to become {target}: these runs tell "
+            "no time within which an alert must come."
+        )
+    times = found.critical.table["reach_q05_s"]
+    first = list(times.index[times == alert])
+    names = ", ".join(first[:NAMED]) + (" and others" if len(first) > NAMED else "")
+    has = "no time, since so many begin so" if alert == 0 else f"{alert:.4g} s"
+    return (
+        f"An alert that must come before 5 % of the episodes of any combination are {target} has "
+        f"{has}: {names}."
+    )
 
 
 def _output(found: CausalAnalysis) -> Table:

@@ -11,19 +11,18 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from sbas.exceptions import InputError
-from sbas.fusion.architecture.model import Thresholds
+from sbas.fusion.architecture.model import MOST_SENSORS, Thresholds
 from sbas.fusion.states import (
     DA,
-    MAX_CODED_SENSORS,
     NO_DATA,
     N,
     U,
     check_thresholds,
     combination_codes,
+    combination_name,
     combination_states,
     combination_words,
     detected,
-    infinite_errors,
     shares,
     states_of,
 )
@@ -165,16 +164,6 @@ def test_hysteresis_and_dwell_never_make_a_state_better(
     assert np.array_equal(held == NO_DATA, np.isnan(error))
 
 
-def test_infinite_errors_are_counted() -> None:
-    (finding,) = infinite_errors([[1.0, np.inf], [-np.inf, np.nan]], where="GPS")
-    assert (finding.severity, finding.where, finding.evidence) == (
-        "warning",
-        "GPS",
-        "2 of 4 errors",
-    )
-    assert infinite_errors([1.0, np.nan]) == ()
-
-
 # --- combinations -----------------------------------------------------------------------------
 
 
@@ -185,10 +174,11 @@ def test_codes_are_the_leaves_of_figure_9() -> None:
     assert combination_codes([U, U, U]) + 1 == 27
     assert combination_words(5, 3) == "(N, DA, U)"
     assert combination_words(-1, 3) == "no data"
+    assert combination_name([N, DA, U, NO_DATA]) == "NDU-"
 
 
 def test_codes_of_many_sensors_do_not_overflow() -> None:
-    for n in (5, 20, MAX_CODED_SENSORS):
+    for n in (5, 20, MOST_SENSORS):
         worst = combination_codes(np.full((n, 2), U, np.int8))
         assert worst.tolist() == [3**n - 1] * 2
         assert worst.dtype == np.int64

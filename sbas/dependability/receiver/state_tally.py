@@ -7,6 +7,7 @@ cut the chain: nothing is counted across.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,8 +29,67 @@ CODES = ("unknown", *STATES, "hardware", "first_fix_wait")
 ROOM_CAP = 1 << 20
 """A run's room beyond this is kept as this: 12 days at 1 Hz, and bounded memory."""
 
-_HARDWARE_SEEN, _FIX_SEEN = 1, 2
 _LENGTH_BITS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """What a receiver gave, epoch by epoch; `after_fault` apart, at most one of these holds.
+
+    Parameters
+    ----------
+    fix : (n,) a position to be used.
+    alarmed : (n,) a position whose fault RAIM has found: no correct one, and no undetected wrong.
+    declared_none : (n,) a position that the receiver itself calls none.
+    lost : (n,) the logger lost the position's own record: there may well have been one.
+    fault : (n,) the hardware has failed.
+    waiting : (n,) no position yet since the hardware failed.
+    after_fault : (n,) since the latest failure of the hardware, itself included, no `fix` and no
+        `alarmed`.
+    """
+
+    fix: Bools
+    alarmed: Bools
+    declared_none: Bools
+    lost: Bools
+    fault: Bools
+    waiting: Bools
+    after_fault: Bools
+
+
+def receiver_answers(table: pd.DataFrame, *, after_fault: bool = False) -> Answers:
+    """What the receiver gave at each epoch of a table, whatever its errors are.
+
+    Parameters
+    ----------
+    table : (n,) epochs with the columns lat_deg, lon_deg, mode, flags and hardware_fault.
+    after_fault : of the epoch before the first.
+    """
+    delivered = np.isfinite(table["lat_deg"].to_numpy()) & np.isfinite(table["lon_deg"].to_numpy())
+    none = table["mode"].cat.codes.to_numpy() == MODES.index("none")
+    fault = table["hardware_fault"].to_numpy()
+    flags = table["flags"].to_numpy()
+    failed = (flags & np.uint32(Flag.RAIM_FAILED)) != 0
+    incomplete = (flags & np.uint32(Flag.EPOCH_INCOMPLETE)) != 0
+    answered = delivered & ~none & ~fault
+    lost = ~delivered & ~none & ~fault & incomplete
+    latest = np.maximum.accumulate(np.where(fault | answered, np.arange(len(table)), -1))
+    since = np.where(latest >= 0, fault[latest], after_fault) if len(table) else fault
+    return Answers(
+        fix=answered & ~failed,
+        alarmed=answered & failed,
+        declared_none=delivered & none & ~fault,
+        lost=lost,
+        fault=fault,
+        # However long it takes: after a failure the receiver waits for its first fix.
+        waiting=since & ~fault & ~lost,
+        after_fault=since,
+    )
+
+
+def one_step_ns(interval_ns: int) -> tuple[int, int]:
+    """Shortest and longest time between two epochs that counts as one interval [ns]."""
+    return interval_ns - interval_ns // 2, int(GAP_STEPS * interval_ns)
 
 
 class StateTally:
@@ -51,8 +111,7 @@ class StateTally:
         self, truth: Truth, threshold_m: float, interval_ns: int, *, destination: bool
     ) -> None:
         self.truth, self.threshold_m, self.destination = truth, threshold_m, destination
-        self.max_step_ns = int(GAP_STEPS * interval_ns)
-        self.min_step_ns = interval_ns - interval_ns // 2
+        self.min_step_ns, self.max_step_ns = one_step_ns(interval_ns)
         self.labels: list[str] = []
         self.epochs = np.zeros((1, len(CODES)), np.int64)
         self.pairs = np.zeros((1, 9), np.int64)
@@ -62,7 +121,7 @@ class StateTally:
         self.without_truth = self.incomplete = self.declared_none = self.unjudged_starts = 0
         self.raim_failed = 0
         self.truth_sigma_h_m = 0.0
-        self._seen = 0
+        self._after_fault = False
         self._offset = 0
         # Code, label and link of the last two epochs, and the last time.
         self._code = np.zeros(2, np.int64)
@@ -111,34 +170,22 @@ class StateTally:
 
     def _codes(self, batch: pd.DataFrame, near: Bools) -> Ints:
         """(n,) states; see `CODES`."""
-        lat, lon = batch["lat_deg"].to_numpy(), batch["lon_deg"].to_numpy()
-        delivered = np.isfinite(lat) & np.isfinite(lon)
-        none = batch["mode"].cat.codes.to_numpy() == MODES.index("none")
-        fault = batch["hardware_fault"].to_numpy()
+        gave = receiver_answers(batch, after_fault=self._after_fault)
+        self._after_fault = bool(gave.after_fault[-1])
         errors = position_errors(batch, self.truth)
         hpe = errors["hpe_m"].to_numpy()
         formed = np.isfinite(hpe)
-        self.declared_none += int(np.sum(delivered & none & ~fault))
-        flags = batch["flags"].to_numpy()
-        # A fault that RAIM has found is no correct position, and no undetected wrong one.
-        alarmed = delivered & ~none & ((flags & np.uint32(Flag.RAIM_FAILED)) != 0)
-        self.raim_failed += int(np.sum(alarmed & ~fault))
-        fix = delivered & ~none & ~alarmed
-        # The logger lost the position's own record: the receiver may well have had one.
-        lost = ~delivered & ~none & ((flags & np.uint32(Flag.EPOCH_INCOMPLETE)) != 0)
         code = np.where(hpe >= self.threshold_m, WRONG, CORRECT)
-        code[fix & ~formed] = UNKNOWN
-        code[~fix] = MISSING
-        code[lost] = UNKNOWN
-        code[fault] = HARDWARE
-        seen = np.where(fault, _HARDWARE_SEEN, np.where(fix | alarmed, _FIX_SEEN, 0))
-        latest = np.maximum.accumulate(np.where(seen > 0, np.arange(seen.size), -1))
-        state = np.where(latest >= 0, seen[latest], self._seen)
-        code[(code == MISSING) & (state == _HARDWARE_SEEN)] = WAITING
-        self._seen = int(state[-1])
-        self.without_truth += int(np.sum(fix & ~formed & ~fault))
-        self.incomplete += int(np.sum(lost & ~fault))
-        judged = fix & formed
+        code[gave.fix & ~formed] = UNKNOWN
+        code[~gave.fix] = MISSING
+        code[gave.lost] = UNKNOWN
+        code[gave.fault] = HARDWARE
+        code[gave.waiting] = WAITING
+        self.declared_none += int(np.sum(gave.declared_none))
+        self.raim_failed += int(np.sum(gave.alarmed))
+        self.without_truth += int(np.sum(gave.fix & ~formed))
+        self.incomplete += int(np.sum(gave.lost))
+        judged = gave.fix & formed
         if judged.any():
             sigma = float(errors["truth_sigma_h_m"].to_numpy()[judged].max())
             self.truth_sigma_h_m = max(self.truth_sigma_h_m, sigma)

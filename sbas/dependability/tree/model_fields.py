@@ -27,7 +27,6 @@ from sbas.dependability.tree.model import (
     Undeveloped,
 )
 from sbas.dependability.tree.model_values import refuse
-from sbas.exceptions import ModelError
 from sbas.integrity.allocation_tree import nearest
 
 FORMAT = "sbas-dep"
@@ -261,10 +260,9 @@ def known_keys(table: Table, known: tuple[str, ...], where: str) -> None:
     """Raise ModelError for a key that is not known, with the nearest one and the full list."""
     for key in table:
         if key not in known:
-            bare = "a number without unit" if key in _BARE else "an unknown key"
-            raise ModelError(
-                bare,
-                where=f"{where}.{key}" if where else str(key),
-                evidence=f"{key} = {table[key]!r}"[:300],
-                cure=nearest(str(key), known),
+            raise refuse(
+                "a number without unit" if key in _BARE else "an unknown key",
+                f"{where}.{key}" if where else str(key),
+                f"{key} = {table[key]!r}",
+                nearest(str(key), known),
             )

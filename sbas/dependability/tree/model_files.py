@@ -8,14 +8,21 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from sbas.bundled import bundled
 from sbas.dependability.tree.model import HybridFaultTree
 from sbas.dependability.tree.model_check import check_model
 from sbas.dependability.tree.model_fields import Parameters, Table, as_table, to_table
 from sbas.dependability.tree.model_values import refuse
 from sbas.dependability.tree.model_variants import ModelFile, build_models
-from sbas.exceptions import InputError, ModelError
-from sbas.integrity.allocation_tree import nearest
+from sbas.dependability.tree.text_files import (
+    Readers,
+    errors_name,
+    found_file,
+    read_table,
+    toml_text,
+    with_suffix,
+    write_text,
+)
+from sbas.exceptions import InputError
 
 LARGEST_FILE = 64_000_000
 """Bytes; a model of that size is no model that somebody wrote."""
@@ -97,19 +104,14 @@ def read_model_file(
     ------
     InputError, ModelError : as `load_model`.
     """
-    file = _find(path)
-    try:
+    file = found_file(path, "a model", "models", _READERS)
+    with errors_name(file):
         return build_models(
-            _parse(file),
+            read_table(file, "a model", _READERS, largest=LARGEST_FILE),
             environments=environments,
             parameters=parameters,
             override_rules=override_rules,
         )
-    except ModelError as error:
-        where = f"{file.name}: {error.where}" if error.where else file.name
-        raise ModelError(
-            error.what, where=where, evidence=error.evidence, cure=error.cure
-        ) from error
 
 
 def dump_model(model: HybridFaultTree, path: str | Path) -> None:
@@ -123,82 +125,31 @@ def dump_model(model: HybridFaultTree, path: str | Path) -> None:
 
     Raises
     ------
-    InputError : another suffix.
+    InputError : another suffix, or a place that cannot be written.
     ModelError : the model is not sound.
     """
-    file = Path(path)
+    file = with_suffix(Path(path), "a model", _READERS)
     check_model(model)
     table = to_table(model)
     if file.suffix == ".json":
         text = json.dumps(table, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    elif file.suffix == ".toml":
-        text = _toml(table)
     else:
-        raise _suffix_error(file)
-    try:
-        content = text.encode("utf-8")
-    except UnicodeEncodeError as error:
-        raise ModelError(
-            "a text that UTF-8 cannot hold", where=model.name, evidence=str(error)
-        ) from error
-    file.write_bytes(content)
+        text = toml_text(table)
+    write_text(text, file, "a model")
 
 
 # --- files ------------------------------------------------------------------------------------
 
 
-def _suffix_error(file: Path) -> InputError:
-    return InputError(
-        "a model file ends in .toml or .json", where=str(file), cure=f"{file.stem}.toml"
-    )
-
-
-def _find(path: str | Path) -> Path:
-    file = Path(path)
-    if isinstance(path, str) and file.suffix == "" and file.name == path:
-        names = sorted(p.stem for p in bundled("models").glob("*.toml"))
-        if path not in names:
-            raise InputError(
-                f"no bundled model {path!r}", where="path",
-                cure=nearest(path, names) + ", or the path of a .toml or .json file",
-            )  # fmt: skip
-        return bundled("models", f"{path}.toml")
-    if file.suffix not in (".toml", ".json"):
-        raise _suffix_error(file)
-    return file
-
-
-def _parse(file: Path) -> Table:
-    try:
-        if file.stat().st_size > LARGEST_FILE:
-            raise InputError(
-                "the file is too large for a model", where=str(file),
-                evidence=f"{file.stat().st_size} bytes, at most {LARGEST_FILE}",
-            )  # fmt: skip
-        content = file.read_bytes()
-    except OSError as error:
-        raise InputError(
-            "the model cannot be read", where=str(file), evidence=str(error)
-        ) from error
-    try:
-        text = content.decode("utf-8-sig")
-        if file.suffix == ".toml":
-            table = tomllib.loads(text)
-            extra = next((key for key in table if key.startswith("x-")), None)
-            if extra is not None:
-                raise refuse(
-                    "TOML files hold no keys of other programs", extra, table[extra],
-                    "write it into meta.notes, or use JSON",
-                )  # fmt: skip
-            return table
-        return _with_notes(_parse_json(text))
-    except ModelError:
-        raise
-    except (ValueError, RecursionError) as error:
-        raise ModelError(
-            f"no {file.suffix[1:].upper()} that can be read",
-            evidence=str(error) if str(error) else type(error).__name__,
-        ) from error
+def _parse_toml(text: str) -> Table:
+    table = tomllib.loads(text)
+    extra = next((key for key in table if key.startswith("x-")), None)
+    if extra is not None:
+        raise refuse(
+            "TOML files hold no keys of other programs", extra, "",
+            "write it into meta.notes, or use JSON",
+        )  # fmt: skip
+    return table
 
 
 def _parse_json(text: str) -> Table:
@@ -213,7 +164,8 @@ def _parse_json(text: str) -> Table:
     def constant(word: str) -> Any:
         raise refuse("no number of JSON", "", word, "write a finite number")
 
-    return as_table(json.loads(text, object_pairs_hook=unique, parse_constant=constant), "file")
+    table = json.loads(text, object_pairs_hook=unique, parse_constant=constant)
+    return _with_notes(as_table(table, "file"))
 
 
 def _with_notes(table: Table) -> Table:
@@ -232,31 +184,4 @@ def _with_notes(table: Table) -> Table:
     return {**table, "meta": meta}
 
 
-def _toml(table: Table) -> str:
-    """TOML of a table whose values are plain, tables, or lists of tables; None is left out."""
-    lines = [f"{k} = {_toml_value(v)}" for k, v in table.items() if not _is_nested(v)]
-    for key, value in table.items():
-        if _is_nested(value):
-            for item in value if isinstance(value, list) else (value,):
-                lines += ["", f"[[{key}]]" if isinstance(value, list) else f"[{key}]"]
-                lines += [f"{k} = {_toml_value(v)}" for k, v in item.items() if v is not None]
-    return "\n".join(lines) + "\n"
-
-
-def _is_nested(value: Any) -> bool:
-    return isinstance(value, dict) or (
-        isinstance(value, list) and bool(value) and isinstance(value[0], dict)
-    )
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        # JSON escapes are TOML escapes; only DEL must be escaped in TOML alone.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{k} = {_toml_value(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(_toml_value(v) for v in value) + "]"
-    return repr(value)
+_READERS: Readers = {".toml": _parse_toml, ".json": _parse_json}

@@ -23,6 +23,7 @@ from sbas.fusion.architecture.architecture_fields import (
 from sbas.fusion.architecture.architecture_times import check_profile, check_times
 from sbas.fusion.architecture.architecture_warnings import warnings_of
 from sbas.fusion.architecture.model import (
+    MOST_SENSORS,
     Accelerometer,
     Architecture,
     InertialUnit,
@@ -34,9 +35,6 @@ from sbas.fusion.architecture.model import (
     Unmodelled,
 )
 from sbas.integrity.allocation_tree import nearest
-
-MOST_SENSORS = 39
-"""The largest n with 3^n below 2^63, where combinations of states are numbered."""
 
 WEIGHT_TOLERANCE = 1e-9
 
@@ -130,10 +128,15 @@ def _check_names(architecture: Architecture) -> None:
                     "the smallest amplitude exceeds the largest", f"{where}.{key}.smallest",
                     f"{burst.smallest:g} > {burst.largest:g}", "exchange them",
                 )  # fmt: skip
+            if burst is not None and key != "outage" and burst.rate_per_s > 0 >= burst.largest:
+                raise refuse(
+                    "bursts without an amplitude disturb nothing", f"{where}.{key}.largest",
+                    f"{burst.largest:g}", "write smallest and largest, or rate_per_s = 0.0",
+                )  # fmt: skip
         if isinstance(sensor, SatelliteReceiver) and sensor.outage.largest > 0:
             raise refuse(
                 "an outage has no amplitude", f"{where}.outage.largest",
-                f"{sensor.outage.largest:g}", "write smallest = 0.0, largest = 0.0",
+                f"{sensor.outage.largest:g}", "leave out smallest and largest",
             )  # fmt: skip
 
 

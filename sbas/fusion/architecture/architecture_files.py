@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 from sbas.bundled import bundled
-from sbas.exceptions import InputError, ModelError
+from sbas.dependability.tree.text_files import (
+    Readers,
+    errors_name,
+    found_file,
+    read_table,
+    toml_text,
+    with_suffix,
+    write_text,
+)
 from sbas.fusion.architecture.architecture_check import check_architecture
 from sbas.fusion.architecture.architecture_fields import (
     KIND_OF,
@@ -26,19 +32,12 @@ from sbas.fusion.architecture.model import (
     Sensor,
     Unmodelled,
 )
-from sbas.integrity.allocation_tree import nearest
-
-__all__ = [
-    "architecture_text",
-    "dump_architecture",
-    "from_table",
-    "load_architecture",
-    "presets",
-    "to_table",
-]
 
 LARGEST_FILE = 256_000
 """Bytes; a larger file is no architecture that somebody wrote."""
+
+_WHAT = "an architecture"
+_READERS: Readers = {".toml": tomllib.loads}
 
 
 def presets() -> tuple[str, ...]:
@@ -74,15 +73,10 @@ def load_architecture(path: str | Path) -> Architecture:
     >>> load_architecture("arch1").names
     ('odo', 'acc', 'gps')
     """
-    file = _find(path)
-    try:
-        architecture = from_table(_parse(file))
+    file = found_file(path, _WHAT, "architectures", _READERS)
+    with errors_name(file):
+        architecture = from_table(read_table(file, _WHAT, _READERS, largest=LARGEST_FILE))
         check_architecture(architecture)
-    except ModelError as error:
-        where = f"{file.name}: {error.where}" if error.where else file.name
-        raise ModelError(
-            error.what, where=where, evidence=error.evidence, cure=error.cure
-        ) from error
     return architecture
 
 
@@ -99,88 +93,9 @@ def dump_architecture(architecture: Architecture, path: str | Path) -> None:
     InputError : another suffix, or a place that cannot be written.
     ModelError : the architecture is not sound.
     """
-    file = _with_suffix(Path(path))
+    file = with_suffix(Path(path), _WHAT, _READERS)
     check_architecture(architecture)
-    try:
-        file.write_bytes(_toml(to_table(architecture)).encode("utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(
-            "the architecture cannot be written", where=str(file), evidence=str(error)
-        ) from error
-
-
-# --- files ------------------------------------------------------------------------------------
-
-
-def _find(path: str | Path) -> Path:
-    file = Path(path)
-    if isinstance(path, str) and file.suffix == "" and file.name == path:
-        if path not in presets():
-            raise InputError(
-                f"no bundled architecture {path!r}", where="path",
-                cure=nearest(path, presets()) + ", or the path of a .toml file",
-            )  # fmt: skip
-        return bundled("architectures", f"{path}.toml")
-    return _with_suffix(file)
-
-
-def _with_suffix(file: Path) -> Path:
-    if file.suffix != ".toml":
-        raise InputError(
-            "a file of an architecture ends in .toml", where=str(file),
-            cure=f"{file.stem or 'architecture'}.toml",
-        )  # fmt: skip
-    return file
-
-
-def _parse(file: Path) -> dict[str, Any]:
-    try:
-        with file.open("rb") as stream:
-            # One byte more than allowed: the size of a pipe or a device is not known before.
-            content = stream.read(LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            "the architecture cannot be read", where=str(file), evidence=str(error),
-            cure="name a .toml file, or one of " + ", ".join(presets()),
-        ) from error  # fmt: skip
-    if len(content) > LARGEST_FILE:
-        raise InputError(
-            "the file is too large for an architecture", where=str(file),
-            evidence=f"more than {LARGEST_FILE} bytes",
-        )  # fmt: skip
-    try:
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise ModelError(
-            "no TOML that can be read", evidence=str(error)[:300] or type(error).__name__,
-            cure="write UTF-8 text as in the bundled arch1.toml",
-        ) from error  # fmt: skip
-
-
-def _toml(table: dict[str, Any]) -> str:
-    """TOML of plain tables: tables and lists of tables at the top, inline ones below."""
-    lines = [f"{key} = {_inline(value)}" for key, value in table.items() if not _nested(value)]
-    for key, value in table.items():
-        if _nested(value):
-            head = f"[[{key}]]" if isinstance(value, list) else f"[{key}]"
-            for item in value if isinstance(value, list) else (value,):
-                lines += ["", head, *(f"{k} = {_inline(v)}" for k, v in item.items())]
-    return "\n".join(lines) + "\n"
-
-
-def _nested(value: Any) -> bool:
-    return isinstance(value, dict) or (
-        isinstance(value, list) and bool(value) and isinstance(value[0], dict)
-    )
-
-
-def _inline(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{k} = {_inline(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(_inline(item) for item in value) + "]"
-    # Escapes, numbers and truth values are written as in JSON; check_fields refuses the rest.
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    write_text(toml_text(to_table(architecture)), file, _WHAT)
 
 
 # --- text -------------------------------------------------------------------------------------

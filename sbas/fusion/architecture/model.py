@@ -7,7 +7,7 @@ laboratory model documented in docs/methods/multisensor.md: Railways 2014 gives 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Final, Literal
 
 Operator = Literal["weighted_mean", "kalman", "per_axis"]
 WeightRule = Literal["fault_free", "with_faults", "per_epoch", "fixed"]
@@ -16,6 +16,9 @@ AxisRule = Literal["worst_axis", "norm"]
 CommonCause = Literal["independent", "per_run", "beta_factor"]
 FaultDetection = Literal["none", "leave_one_out", "correlation"]
 StateOf = Literal["used", "own"]
+
+MOST_SENSORS: Final = 39
+"""The largest n with 3^n below 2^63, by which combinations of states are numbered."""
 
 
 # --- what moves and what measures -------------------------------------------------------------
@@ -63,9 +66,9 @@ class Bursts:
 
     rate_per_s: float
     mean_duration_s: float
-    smallest: float
-    largest: float
-    """Amplitude of a burst, uniform between both; its unit is that of what it disturbs."""
+    smallest: float = 0.0
+    largest: float = 0.0
+    """Amplitude, uniform between both, in the unit of what it disturbs; an outage has none."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,7 @@ class SatelliteReceiver:
     tau_s: float = 30.0
     multipath: Bursts = Bursts(1 / 60, 5.0, 1.5, 8.0)
     """Metres, of either sign."""
-    outage: Bursts = Bursts(1 / 150, 6.0, 0.0, 0.0)
+    outage: Bursts = Bursts(1 / 150, 6.0)
     missing: Missing = Missing()
     failure_rate_per_h: float = 0.0
     source: str = ""

@@ -24,13 +24,12 @@ from sbas.fusion.critical.episodes import (
     OUTPUTS,
     Episodes,
     Target,
-    combination_name,
     extract_episodes,
     states_of_key,
 )
 from sbas.fusion.critical.run_bootstrap import drawn_runs
 from sbas.fusion.fused_runs import States
-from sbas.fusion.states import NO_DATA, U
+from sbas.fusion.states import NO_DATA, U, combination_name
 
 Ints = NDArray[np.int64]
 

@@ -6,7 +6,6 @@ output reaches the target state, the combination is left, or the record ends.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
@@ -34,7 +33,6 @@ MAX_SENSORS: Final = 31
 """Base-4 keys of more sensors do not fit into 64 bits."""
 OUTPUTS: Final = (N, DA, U, NO_DATA)
 _LEVELS: Final = {"U": U, "DA": DA}
-_LETTERS: Final = {N: "N", DA: "D", U: "U", NO_DATA: "-"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +89,6 @@ class Episodes:
         there: Bools = self.outcome != NOT_AT_RISK
         return there
 
-    @property
-    def time_s(self) -> NDArray[np.float64]:
-        """(e,) time from the entry to the outcome [s]."""
-        return np.asarray(self.steps * self.step_s, np.float64)
-
 
 # --- combinations as numbers ------------------------------------------------------------------
 
@@ -136,11 +129,6 @@ def combination_keys(sensor_state: States) -> NDArray[Any]:
 def states_of_key(key: int, sensors: int) -> tuple[int, ...]:
     """(n,) codes of the sensors' states in a combination, the first sensor first."""
     return tuple((key >> 2 * place & 3) - 1 for place in range(sensors - 1, -1, -1))
-
-
-def combination_name(states: Sequence[int]) -> str:
-    """A combination in letters, a letter a sensor: N, D for DA, U, and "-" for no data."""
-    return "".join(_LETTERS[state] for state in states)
 
 
 # --- episodes ---------------------------------------------------------------------------------

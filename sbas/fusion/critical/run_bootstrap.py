@@ -39,10 +39,16 @@ def drawn_runs(runs: int, *, replicates: int, seed: int) -> Counts:
     (runs, replicates + 1) counts: ones, then multinomial draws of `runs` runs each.
     """
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_STREAM,)))
-    drawn = np.ones((replicates + 1, runs), np.uint16)
-    for row in drawn[1:]:
-        row[:] = np.bincount(rng.integers(0, runs, runs), minlength=runs)
-    return np.ascontiguousarray(drawn.T)
+    seen = np.ones((1, runs), np.uint16)
+    return np.ascontiguousarray(np.concatenate([seen, resampled(runs, replicates, rng)]).T)
+
+
+def resampled(runs: int, replicates: int, rng: np.random.Generator) -> Counts:
+    """(replicates, runs) how often each run is drawn, in as many draws as there are runs."""
+    drawn = np.empty((replicates, runs), np.uint16)
+    for row in drawn:
+        row[:] = np.bincount(rng.integers(runs, size=runs), minlength=runs)
+    return drawn
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,11 +27,11 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sbas.exceptions import InputError
+from sbas.fusion.critical.run_bootstrap import resampled
 from sbas.fusion.fused_runs import Bools, Floats, FusedRuns, States
 from sbas.fusion.importance.importance_results import (
     LAWS,
@@ -46,7 +46,6 @@ from sbas.fusion.importance.importance_results import (
     law_differences,
 )
 from sbas.fusion.importance.top_shares import (
-    WORST_FROM,
     RunCounts,
     Top,
     TopShares,
@@ -55,15 +54,15 @@ from sbas.fusion.importance.top_shares import (
     fixed_by_table,
     independent_shares,
     marked,
-    resampled_weights,
     run_counts,
 )
+from sbas.fusion.logic.boolean_form import WORST_FROM
+from sbas.fusion.logic.truth_table import TruthTable
 from sbas.fusion.states import DA, NO_DATA, WORDS, N, U, combination_codes
 
-if TYPE_CHECKING:
-    from sbas.fusion.logic.truth_table import TruthTable
-
 _LEAST_REPLICATES = 100
+_BLOCK_CELLS = 1 << 22
+"""Of the counts of drawn runs that become numbers of 8 bytes at a time."""
 
 
 # --- questions --------------------------------------------------------------------------------
@@ -189,7 +188,10 @@ def _bootstrap(
     """(2, ...) bounds of every measure, of P(T) and of its difference to the table's."""
     found: dict[tuple[Law, Top], dict[str, list[Floats]]] = {key: {} for key in counted}
     runs = len(next(iter(counted.values())).epochs)
-    for weights in resampled_weights(runs, replicates, seed):
+    drawn_runs = resampled(runs, replicates, np.random.default_rng(seed))
+    block = max(1, _BLOCK_CELLS // runs)
+    for first in range(0, replicates, block):
+        weights = drawn_runs[first : first + block].astype(float)
         shares = {key: counts.shares(weights) for key, counts in counted.items()}
         for (law, top), drawn in shares.items():
             gap = drawn.top - shares["joint", top].top

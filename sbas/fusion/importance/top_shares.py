@@ -6,28 +6,23 @@ output is not nominal, and `isU`, it is unacceptable.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
 from sbas.fusion.fused_runs import Bools, Floats, States
+from sbas.fusion.logic.boolean_form import Condition, holds, lowest_true
+from sbas.fusion.logic.truth_table import TruthTable
 from sbas.fusion.states import DA, N, U
 
-if TYPE_CHECKING:
-    from sbas.fusion.logic.truth_table import TruthTable
-
-Top = Literal["notN", "isU"]
+Top = Condition
 Counts = NDArray[np.int64]
 
-WORST_FROM: Final[dict[Top, int]] = {"notN": DA, "isU": U}
-"""The top event holds where the output's state has this code or a higher one."""
 _LEVELS: Final = (DA, U)
 _SUM_TOLERANCE = 1e-9
-_CHUNK = 1 << 22
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +93,7 @@ class RunCounts:
 
 def marked(table: TruthTable, top: Top) -> Bools:
     """(3,) * n whether the table's output is in the top, one axis a sensor, the first first."""
-    outcomes = np.asarray(table.outcomes)
-    return (outcomes >= WORST_FROM[top]).reshape((3,) * len(table.names))
+    return holds(table, top).reshape((3,) * len(table.names))
 
 
 def fixed_by_table(top: Bools) -> Bools:
@@ -132,13 +126,9 @@ def cut_levels(top: Bools) -> Bools | None:
     minimal cut with the event holds: Fussell 1975.
     """
     n = top.ndim
-    if any((np.diff(top.astype(np.int8), axis=axis) < 0).any() for axis in range(n)):
+    minimal = lowest_true(top)
+    if minimal is None:
         return None
-    minimal = top.copy()
-    for axis in range(n):
-        better = np.zeros_like(top)
-        np.moveaxis(better, axis, 0)[1:] = np.moveaxis(top, axis, 0)[:-1]
-        minimal &= ~better
     found = np.zeros((n, 2, *top.shape), bool)
     for sensor in range(n):
         for level in _LEVELS:
@@ -240,18 +230,3 @@ def run_counts(
             by_cut[:, *place] = (cuts[place].ravel()[codes] & happened).sum(axis=0)
     epochs = known.sum(axis=0).astype(float)
     return RunCounts(epochs, level, happened.sum(axis=0).astype(float), both, by_cut)
-
-
-def resampled_weights(runs: int, replicates: int, seed: int) -> Iterator[Floats]:
-    """How often each run is drawn when the runs are resampled with replacement.
-
-    Yields
-    ------
-    (b, runs) counts, b replicates at a time, `replicates` in all.
-    """
-    rng = np.random.default_rng(seed)
-    at_once = max(1, _CHUNK // runs)
-    for start in range(0, replicates, at_once):
-        size = min(at_once, replicates - start)
-        drawn = rng.integers(runs, size=(size, runs)) + runs * np.arange(size)[:, None]
-        yield np.bincount(drawn.ravel(), minlength=size * runs).reshape(size, runs).astype(float)

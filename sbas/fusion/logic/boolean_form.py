@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ from sbas.fusion.states import DA, N, U, combination_states, combination_words
 Condition = Literal["notN", "isU"]
 Bools = NDArray[np.bool_]
 
+WORST_FROM: Final[dict[Condition, int]] = {"notN": DA, "isU": U}
+"""The condition holds where the output's state has this code or a higher one."""
 MAX_NOT_MONOTONE = 9
 """Sensors of a table that is not monotone: it has 6^n products."""
 
@@ -69,7 +71,7 @@ def holds(table: TruthTable, condition: Condition) -> Bools:
         raise InputError(
             f"{condition!r} is no condition", where="condition", cure="notN (DA or U) or isU"
         )
-    return np.asarray(table.outcomes == U if condition == "isU" else table.outcomes != N)
+    return np.asarray(table.outcomes >= WORST_FROM[condition])
 
 
 def two_line_form(names: Sequence[str]) -> TruthTable:
@@ -118,9 +120,9 @@ def prime_implicants(table: TruthTable, condition: Condition) -> tuple[Implicant
     """
     true = holds(table, condition)
     n = len(table.names)
-    if len(_falls(table, true)) == 0:
-        lowest = combination_states(np.flatnonzero(_lowest(true, n)), n).T
-        return _in_order(Implicant(tuple(low), (U,) * n) for low in lowest.tolist())
+    lowest = lowest_true(true.reshape((3,) * n))
+    if lowest is not None:
+        return _in_order(Implicant(tuple(low), (U,) * n) for low in np.argwhere(lowest).tolist())
     if n > MAX_NOT_MONOTONE:
         raise InputError(
             f"{condition} is not monotone and has more than {MAX_NOT_MONOTONE} sensors",
@@ -134,18 +136,6 @@ def prime_implicants(table: TruthTable, condition: Condition) -> tuple[Implicant
         )
         for product in _widest(true, n)
     )
-
-
-def covered(implicants: Iterable[Implicant], sensors: int) -> Bools:
-    """(3^n,) combinations that any of the implicants makes true."""
-    states = combination_states(np.arange(3**sensors), sensors)
-    true = np.zeros(3**sensors, np.bool_)
-    for implicant in implicants:
-        inside = np.ones(3**sensors, np.bool_)
-        for k in implicant.literals:
-            inside &= (states[k] >= implicant.lowest[k]) & (states[k] <= implicant.highest[k])
-        true |= inside
-    return true
 
 
 def minimal_cuts(table: TruthTable, condition: Condition) -> tuple[Implicant, ...]:
@@ -204,14 +194,25 @@ def _in_order(implicants: Iterable[Implicant]) -> tuple[Implicant, ...]:
     return tuple(sorted(implicants, key=lambda i: (len(i.literals), i.literals, i)))
 
 
-def _lowest(true: Bools, n: int) -> Bools:
-    """Of a monotone function: where it is true, and false as soon as one sensor gets better."""
-    shaped = true.reshape((3,) * n)
-    lowest = shaped.copy()
-    for axis in range(n):
+def lowest_true(true: Bools) -> Bools | None:
+    """Where a monotone function is true, and false as soon as one sensor gets better.
+
+    Parameters
+    ----------
+    true : (3,) * n where it is true, one axis a sensor, the first first.
+
+    Returns
+    -------
+    (3,) * n; None where the function is not monotone: a sensor that gets worse makes it false.
+    """
+    lowest = true.copy()
+    for axis in range(true.ndim):
+        along = np.moveaxis(true, axis, 0)
+        if np.any(along[:U] & ~along[DA:]):
+            return None
         worse = np.moveaxis(lowest, axis, 0)[DA:]
-        worse &= ~np.moveaxis(shaped, axis, 0)[:U]
-    return lowest.ravel()
+        worse &= ~along[:U]
+    return lowest
 
 
 def _widest(true: Bools, n: int) -> list[list[int]]:

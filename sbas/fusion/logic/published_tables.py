@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from sbas.exceptions import InputError
-from sbas.fusion.logic.truth_table import LETTERS, Codes, TruthTable, table_from_letters
-from sbas.fusion.states import combination_codes
+from sbas.fusion.logic.truth_table import Codes, TruthTable, table_from_letters
+from sbas.fusion.states import LETTERS, combination_codes
 
 Figure9 = Literal["corrected", "printed"]
 

@@ -22,6 +22,8 @@ from sbas.fusion.logic.interval_rules import (
 from sbas.fusion.states import (
     DA,
     DEFAULT_THRESHOLDS,
+    LETTERS,
+    NO_DATA,
     WORDS,
     N,
     States,
@@ -32,7 +34,6 @@ from sbas.fusion.states import (
 )
 
 Codes = NDArray[np.int64]
-LETTERS = {"N": N, "D": DA, "U": U}
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,12 +147,13 @@ def table_from_letters(names: Sequence[str], letters: str, *, provenance: str) -
     InputError : another letter, or a wrong number of them.
     """
     packed = "".join(letters.split())
-    unknown = sorted(set(packed) - LETTERS.keys())
-    if unknown:
+    outcomes = np.array([LETTERS.get(letter, NO_DATA) for letter in packed], np.int8)
+    if np.any(outcomes == NO_DATA):
         raise InputError(
-            f"{unknown[0]!r} is no state", where="letters", cure="N, D (for DA) or U each"
+            f"{packed[int(np.argmin(outcomes))]!r} is no state",
+            where="letters",
+            cure="N, D (for DA) or U each",
         )
-    outcomes = np.array([LETTERS[letter] for letter in packed], np.int8)
     return TruthTable(tuple(names), outcomes, provenance)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sbas.dependability.receiver.state_tally import one_step_ns, receiver_answers
 from sbas.exceptions import InputError
 from sbas.findings import Finding, refuse_on_errors
 from sbas.frames import decimal_year
@@ -23,8 +24,7 @@ from sbas.fusion.recorded.detection_counts import DetectionCounts
 from sbas.fusion.states import DA, NO_DATA, N, U, check_thresholds, states_of
 from sbas.input_check import accept, check
 from sbas.integrity.position_error import position_errors
-from sbas.recording import MODES, Flag, Recording, left_out_levels, with_columns
-from sbas.recording_survey import GAP_STEPS
+from sbas.recording import Recording, left_out_levels, with_columns
 from sbas.timescales import NS_PER_S
 from sbas.track import Track
 from sbas.truth import Truth, frame_findings
@@ -175,10 +175,10 @@ def along_track_errors(
     along = east * np.sin(np.radians(azimuth)) + north * np.cos(np.radians(azimuth))
     across = east * np.cos(np.radians(azimuth)) - north * np.sin(np.radians(azimuth))
 
-    fix, alarmed, unknown = _answers(table)
+    gave = receiver_answers(table)
     size = hpe if judged_by == "horizontal" else np.abs(along)
-    unknown = unknown | (fix & ~np.isfinite(size))
-    judged = fix & np.isfinite(size)
+    judged = gave.fix & np.isfinite(size)
+    unknown = gave.fault | gave.lost | gave.waiting | (gave.fix & ~judged)
     # Each epoch by itself, as in `sbas.receiver_states`: no state is held across gaps.
     plain = replace(bounds, hysteresis_m=0.0, min_dwell_s=0.0)
     state = states_of(np.where(judged, size, np.nan), plain)
@@ -195,15 +195,15 @@ def along_track_errors(
         false_alarm_n=barred_n, false_alarm_da=barred_da, detected=barred_u,
         misleading=int(np.sum(usable & (size >= level) & ~unacceptable)),
         no_level_n=open_n, no_level_da=open_da, no_level_u=open_u,
-        raim_failed=int(np.sum(alarmed)),
-        raim_failed_u=int(np.sum(alarmed & unacceptable)),
+        raim_failed=int(np.sum(gave.alarmed)),
+        raim_failed_u=int(np.sum(gave.alarmed & unacceptable)),
         no_data=int(np.sum((state == NO_DATA) & ~unknown)),
         unknown=int(np.sum(unknown)),
     )  # fmt: skip
     if not counts.judged:
         raise InputError(
             "no epoch has a known error", code="E01",
-            evidence=f"{len(table):,} epochs, {int(np.sum(fix)):,} with a fix",
+            evidence=f"{len(table):,} epochs, {int(np.sum(gave.fix)):,} with a fix",
             cure="check the times and the steps of the truth",
         )  # fmt: skip
     undirected = int(np.sum(judged & ~np.isfinite(along)))
@@ -271,34 +271,13 @@ def _by_state(state: NDArray[np.int8], where: Bools) -> tuple[int, int, int]:
     return n, da, u
 
 
-def _answers(table: pd.DataFrame) -> tuple[Bools, Bools, Bools]:
-    """(n,) a fix to be used, a fix that RAIM has failed, and nothing that tells of the receiver.
-
-    The rules are those of `sbas.receiver_states`.
-    """
-    delivered = np.isfinite(table["lat_deg"].to_numpy()) & np.isfinite(table["lon_deg"].to_numpy())
-    none = table["mode"].cat.codes.to_numpy() == MODES.index("none")
-    fault = table["hardware_fault"].to_numpy()
-    flags = table["flags"].to_numpy()
-    failed = (flags & np.uint32(Flag.RAIM_FAILED)) != 0
-    alarmed = delivered & ~none & failed & ~fault
-    fix = delivered & ~none & ~failed & ~fault
-    lost = ~delivered & ~none & ((flags & np.uint32(Flag.EPOCH_INCOMPLETE)) != 0)
-    # After a hardware fault the receiver waits for its first fix, however long it takes.
-    at = np.arange(len(table))
-    last_fault = np.maximum.accumulate(np.where(fault, at, -1)) if len(table) else at
-    answered = (delivered & ~none) & ~fault
-    last_answer = np.maximum.accumulate(np.where(answered, at, -1)) if len(table) else at
-    waiting = ~answered & (last_fault > last_answer)
-    return fix, alarmed, fault | lost | waiting
-
-
 def _follows(table: pd.DataFrame, interval_ns: int, unknown: Bools) -> Bools:
     """(n,) True where a step of one interval, by the rules of `sbas.receiver_states`, links two
     epochs whose state is told."""
     time_ns = table.index.to_numpy().astype(np.int64)
     step = time_ns[1:] - time_ns[:-1]
-    near = (step >= interval_ns - interval_ns // 2) & (step <= int(GAP_STEPS * interval_ns))
+    shortest, longest = one_step_ns(interval_ns)
+    near = (step >= shortest) & (step <= longest)
     return np.concatenate([[False], near & ~unknown[1:] & ~unknown[:-1]])
 
 

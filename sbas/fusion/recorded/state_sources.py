@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from sbas.dependability.exact.transitions import stationary_law
 from sbas.dependability.tree.model import MarkovSource, Stage
 from sbas.exceptions import InputError
-from sbas.fusion.critical.episodes import combination_keys, combination_name, states_of_key
+from sbas.fusion.critical.episodes import combination_keys, states_of_key
 from sbas.fusion.recorded.recorded_errors import RecordedErrors
-from sbas.fusion.states import DA, NO_DATA, WORDS, N, U
+from sbas.fusion.states import DA, NO_DATA, WORDS, N, U, combination_name
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -29,10 +29,9 @@ from sbas.dependability.tree.model import (
 from sbas.dependability.tree.model_check import check_model
 from sbas.exceptions import InputError
 from sbas.fusion.logic.boolean_form import Condition, Implicant, prime_implicants
-from sbas.fusion.logic.truth_table import LETTERS, TruthTable
-from sbas.fusion.states import DA, WORDS, N, U
+from sbas.fusion.logic.truth_table import TruthTable
+from sbas.fusion.states import DA, LETTERS, NO_DATA, WORDS, N, U
 
-NO_DATA_LETTER = "-"
 NOTES = (
     "the truth table stands for the fusion: a simulated fusion may be unacceptable more often",
     "a sensor without data counts as U: a truth table has no fourth state",
@@ -190,7 +189,7 @@ def _check_names(
                 cure="one sensor_source(name, ...) a sensor, under its name",
             )
     elif any(
-        len(state) != len(table.names) or not set(state) <= {*LETTERS, NO_DATA_LETTER}
+        len(state) != len(table.names) or not set(state) <= LETTERS.keys()
         for state in sources.states
     ):
         raise InputError(
@@ -231,8 +230,7 @@ class _Tree:
 
     def lasting(self, letters: str, seconds: float, step_s: float) -> str:
         """Gate that is true once a combination, or a worse one, has lasted for so long."""
-        known = {**LETTERS, NO_DATA_LETTER: U}
-        if len(letters) != len(self.names) or not set(letters) <= known.keys():
+        if len(letters) != len(self.names) or not set(letters) <= LETTERS.keys():
             raise InputError(
                 f"{letters!r} is no combination of {', '.join(self.names)}",
                 cure="a letter a sensor: N, D for DA, U, - for no data",
@@ -242,7 +240,7 @@ class _Tree:
                 f"how long {letters} may last is not known", evidence=f"{seconds} s",
                 cure="leave the combination out where no time can be estimated or none is reached",
             )  # fmt: skip
-        lowest = [known[letter] for letter in letters]
+        lowest = [_level(letter) for letter in letters]
         if not any(lowest):
             raise InputError(f"the combination {letters} has no fault", cure="leave it out")
         inputs = tuple(
@@ -296,7 +294,11 @@ class _Tree:
     def _states(self, k: int, level: int) -> tuple[str, ...]:
         """Names of the source's states in which a sensor is at a level or worse, or silent."""
         if isinstance(self.sources, MarkovSource):
-            levels = {**LETTERS, NO_DATA_LETTER: U}
-            return tuple(s for s in self.sources.states if levels[s[k]] >= level)
+            return tuple(s for s in self.sources.states if _level(s[k]) >= level)
         better = {WORDS[N], WORDS[DA]} if level == U else {WORDS[N]}
         return tuple(s for s in self.sources[self.names[k]].states if s not in better)
+
+
+def _level(letter: str) -> int:
+    """State that a letter counts as: no data as U."""
+    return U if LETTERS[letter] == NO_DATA else LETTERS[letter]

@@ -9,7 +9,6 @@ Source: docs/methods/multisensor.md.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -153,19 +152,6 @@ def _check(
             where="acceleration_error, speed_error",
             cure="a filter needs both at every sub-step",
         )
-    noise = ("acceleration_mps2_per_rthz", "speed_mps", "position_m")
-    wrong = [name for name in noise if not 0 < getattr(tuning, name) < math.inf]
-    start = ("initial_position_m", "initial_speed_mps")
-    wrong += [name for name in start if not 0 <= getattr(tuning, name) < math.inf]
-    if tuning.gate is not None and not tuning.gate > 0:
-        wrong.append("gate")
-    if wrong:
-        raise InputError(
-            "a Kalman filter needs noise above 0, a start of 0 or more and a gate above 0",
-            where=", ".join(f"filter.{name}" for name in wrong),
-            evidence=", ".join(f"{name} = {getattr(tuning, name)}" for name in wrong),
-            cure="write the standard deviation that the sensor's sheet gives",
-        )
     if tuning.gate is None and np.isinf(fix).any():
         raise InputError(
             "an infinite fix leaves nothing of a filter without a gate",
@@ -224,7 +210,7 @@ def filtered_errors(
     acceleration_error : (t * substeps, r) errors of the accelerometer [m/s2].
     speed_error : (t * substeps, r) errors of the odometer [m/s].
     fix_error : (t, r) errors of the satellite fixes [m]; NaN where there is none.
-    tuning : noise that the filter assumes, its start and its gate.
+    tuning : noise that the filter assumes, its start and its gate; sound by `check_fields`.
     substep_s : sub-step [s].
     substeps : sub-steps in an epoch.
 
@@ -234,7 +220,7 @@ def filtered_errors(
 
     Raises
     ------
-    InputError : shapes that do not fit, noise of 0, errors that are not finite.
+    InputError : shapes that do not fit, errors that are not finite.
     """
     errors = np.empty(fix_error.shape)
     course = _epochs(acceleration_error, speed_error, fix_error, tuning, substep_s, substeps)

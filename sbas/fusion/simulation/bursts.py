@@ -10,13 +10,11 @@ Source: docs/methods/multisensor.md.
 from __future__ import annotations
 
 import dataclasses
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sbas.exceptions import InputError
 from sbas.fusion.architecture.model import Bursts, CommonCause
 from sbas.fusion.fused_runs import Bools, Floats
 
@@ -79,55 +77,6 @@ class BurstRuns:
         return (self.start[burst] + within) * self.runs + self.run[burst], burst
 
 
-def switching_probabilities(bursts: Bursts, step_s: float) -> tuple[float, float]:
-    """Probabilities that the chain goes on, and off, in one step: 1 - exp(-step / mean).
-
-    Parameters
-    ----------
-    bursts : rate and mean duration.
-    step_s : step of the chain [s].
-
-    Returns
-    -------
-    (on, off) probabilities a step [1].
-
-    Raises
-    ------
-    InputError : a rate, a duration or amplitudes that cannot be.
-    """
-    possible = (
-        0 <= bursts.rate_per_s < math.inf
-        and 0 <= bursts.mean_duration_s < math.inf
-        and -math.inf < bursts.smallest <= bursts.largest < math.inf
-    )
-    if not possible:
-        raise InputError(
-            "bursts have a rate and a mean duration of 0 or more, and smallest <= largest",
-            where="bursts",
-            evidence=str(bursts),
-            cure="rate_per_s = 0 switches them off",
-        )
-    duration_s = bursts.mean_duration_s
-    off = -math.expm1(-step_s / duration_s) if duration_s else 1.0
-    return -math.expm1(-bursts.rate_per_s * step_s), off
-
-
-def on_share(bursts: Bursts, step_s: float) -> float:
-    """Share of steps with a burst in the long run: p_on / (p_on + p_off).
-
-    Parameters
-    ----------
-    bursts : rate and mean duration.
-    step_s : step of the chain [s].
-
-    Returns
-    -------
-    Stationary probability [1].
-    """
-    on, off = switching_probabilities(bursts, step_s)
-    return on / (on + off)
-
-
 def draw_bursts(
     bursts: Bursts, *, step_s: float, steps: int, runs: int, rng: np.random.Generator
 ) -> BurstRuns:
@@ -144,15 +93,13 @@ def draw_bursts(
     -------
     When which run has a burst.
     """
-    on, _ = switching_probabilities(bursts, step_s)
-    mean_off = math.inf if on == 0.0 else 1 / (bursts.rate_per_s * step_s)
-    mean_on = bursts.mean_duration_s / step_s
-    run = np.arange(runs if on > 0.0 else 0)
+    rate, mean_on = bursts.rate_per_s * step_s, bursts.mean_duration_s / step_s
+    run = np.arange(runs if rate > 0.0 else 0)
     # The step before the first belongs to the first stretch without a burst.
     stop = np.full(run.size, -1)
     found = []
     while run.size:
-        start = stop + _sojourns(mean_off, run.size, steps, rng)
+        start = stop + _sojourns(1 / rate, run.size, steps, rng)
         inside = start < steps
         run, start = run[inside], start[inside]
         stop = start + _sojourns(mean_on, run.size, steps, rng)
@@ -198,17 +145,7 @@ def draw_shared_bursts(
     Returns
     -------
     When which run has a burst; the amplitudes are each sensor's own.
-
-    Raises
-    ------
-    InputError : a share outside [0, 1].
     """
-    if not 0 <= share <= 1:
-        raise InputError(
-            "the share of common causes lies in [0, 1]",
-            where="redundancy.share",
-            evidence=str(share),
-        )
 
     def drawn(part: float, rng: np.random.Generator) -> BurstRuns:
         scaled = dataclasses.replace(bursts, rate_per_s=part * bursts.rate_per_s)

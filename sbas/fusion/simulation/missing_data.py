@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sbas.exceptions import ModelError
 from sbas.fusion.architecture.model import Architecture, Missing, StateOf
 from sbas.fusion.fused_runs import Bools, Floats, SensorRuns
 from sbas.fusion.simulation.speed_profile import positions_m
@@ -69,12 +68,8 @@ def used_errors(
     Parameters
     ----------
     runs : sensors by name.
-    missing : policy by sensor; a sensor that is not named is removed.
+    missing : policy by sensor, sound by `check_architecture`; a sensor not named is removed.
     true_position_m : (t,) along the track at the epochs, from the origin [m].
-
-    Raises
-    ------
-    ModelError : a policy takes the values of a sensor that is not there, or of the silent one.
 
     Notes
     -----
@@ -101,14 +96,6 @@ def _used(
 ) -> UsedErrors:
     sensor = runs[name]
     own = sensor.error_m
-    others = [other for other in runs if other != name]
-    if policy.policy in ("extrapolate", "substitute") and policy.by not in others:
-        raise ModelError(
-            f"where {name!r} is silent another sensor must help, and {policy.by!r} is none",
-            where=f"sensors.{name}.missing",
-            evidence=f'policy "{policy.policy}"',
-            cure="name one of " + ", ".join(others) if others else 'write policy = "hold"',
-        )
     silent = np.isnan(own)
     silent[~np.asarray(sensor.measures)] = False
     where = np.nonzero(silent)

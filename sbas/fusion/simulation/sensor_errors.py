@@ -9,9 +9,8 @@ Source: docs/methods/multisensor.md; all parameters are defaults chosen there.
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
@@ -26,7 +25,6 @@ from sbas.fusion.architecture.model import (
     Odometer,
     Redundancy,
     SatelliteReceiver,
-    Sensor,
     Unmodelled,
 )
 from sbas.fusion.fused_runs import Floats, SensorRuns
@@ -53,7 +51,7 @@ def draw_sensors(
 
     Parameters
     ----------
-    architecture : sensors, motion and grid of time.
+    architecture : sound by `check_architecture`, with a source for each sensor without model.
     runs : number of runs, 1 or more.
     rng : seed of the batch; it is not changed, the same one gives the same errors again.
     sources : by name of a sensor: errors that replace its model. NaN is no data.
@@ -64,10 +62,9 @@ def draw_sensors(
 
     Raises
     ------
-    InputError : a sensor without a model, steps that are no multiples of each other, sources or
-        common causes that do not fit the sensors.
+    InputError : sources that do not fit the sensors.
     """
-    _check(architecture, runs, sources)
+    _check_sources(architecture, sources)
     drawn = {}
     for sensor in architecture.sensors:
         streams = _Streams(architecture, runs, sensor.name, rng)
@@ -192,7 +189,7 @@ def _satellite_receiver(
 
     Multipath comes and goes on all axes at once, with an amplitude and a sign on each.
     """
-    every = _epochs_a_fix(architecture, sensor)
+    every = round(sensor.interval_s / architecture.step_s)
     fixes = architecture.epochs // every
     outage = streams.bursts(sensor.outage, sensor.interval_s, fixes).on()
     multipath = streams.bursts(sensor.multipath, sensor.interval_s, fixes)
@@ -274,100 +271,31 @@ def _first_axes(architecture: Architecture, count: int) -> tuple[bool, ...]:
     return tuple(axis < count for axis in range(architecture.axes))
 
 
-# --- what cannot be simulated -----------------------------------------------------------------
+# --- sources that do not fit ------------------------------------------------------------------
 
 
-def _whole(longer_s: float, shorter_s: float, words: str) -> int:
-    """How often a step fits into another one."""
-    possible = 0 < shorter_s < math.inf and longer_s < math.inf
-    count = round(longer_s / shorter_s) if possible else 0
-    if count < 1 or not math.isclose(count * shorter_s, longer_s, rel_tol=1e-9):
-        raise InputError(
-            f"{words} is no multiple",
-            where="step_s, substep_s, duration_s, interval_s",
-            evidence=f"{longer_s} s and {shorter_s} s",
-            cure="choose steps that fit into each other, as 0.1 s, 1 s and 100 s do",
-        )
-    return count
-
-
-def _epochs_a_fix(architecture: Architecture, sensor: SatelliteReceiver) -> int:
-    words = f"the interval of the fixes of {sensor.name!r} against step_s"
-    return _whole(sensor.interval_s, architecture.step_s, words)
-
-
-def _check(architecture: Architecture, runs: int, sources: Mapping[str, ErrorSource]) -> None:
-    where = f"architecture {architecture.name!r}"
-    if runs < 1:
-        raise InputError("a simulation has one run or more", where="runs", evidence=str(runs))
-    _whole(architecture.duration_s, architecture.step_s, "duration_s against step_s")
-    _whole(architecture.step_s, architecture.substep_s, "step_s against substep_s")
+def _check_sources(architecture: Architecture, sources: Mapping[str, ErrorSource]) -> None:
     unknown = sorted(set(sources) - set(architecture.names))
     if unknown:
         raise InputError(
             f"no sensor is called {', '.join(map(repr, unknown))}",
             where="sources",
-            cure=f"sensors of {where}: {', '.join(architecture.names)}",
+            cure=f"sensors of {architecture.name}: {', '.join(architecture.names)}",
         )
-    missing = [
-        f"{sensor.name!r} ({sensor.kind})"
-        for sensor in architecture.sensors
-        if isinstance(sensor, Unmodelled) and sensor.name not in sources
-    ]
-    if missing:
-        raise InputError(
-            f"there is no error model of {', '.join(missing)}",
-            where=where,
-            cure="give its errors in `sources`, or leave the sensor out",
-        )
-    for problem in _unfit(architecture, sources):
-        raise InputError(problem, where=where)
-
-
-def _unfit(architecture: Architecture, sources: Mapping[str, ErrorSource]) -> Iterator[str]:
-    """What in names, sources and redundancy does not fit."""
-    names = architecture.names
-    if len(set(names)) < len(names):
-        yield f"two sensors have one name: {', '.join(names)}"
     for sensor in architecture.sensors:
-        moves = isinstance(sensor, Odometer | Accelerometer | InertialUnit)
-        if architecture.operator == "kalman" and moves and sensor.name in sources:
-            yield (
-                f"a Kalman filter needs speed and acceleration at every sub-step: the errors of "
-                f"{sensor.name!r} cannot be replaced"
+        if sensor.name not in sources:
+            continue
+        if architecture.operator == "kalman" and not isinstance(
+            sensor, SatelliteReceiver | Unmodelled
+        ):
+            raise InputError(
+                f"the errors of {sensor.name!r} cannot be replaced: a Kalman filter needs speed "
+                "and acceleration at every sub-step",
+                where="sources",
             )
-        for name, value in vars(sensor).items():
-            if isinstance(value, int | float) and not 0 <= value < math.inf:
-                yield f"{name} of {sensor.name!r} is no number of 0 or more: {value}"
-        if isinstance(sensor, SatelliteReceiver) and sensor.tau_s == 0:
-            yield f"the correlation time of {sensor.name!r} is 0: set correlated_m = 0 instead"
-    grouped = [name for group in architecture.redundancy for name in group.sensors]
-    if len(set(grouped)) < len(grouped):
-        yield f"a sensor belongs to one redundant group, once: {', '.join(grouped)}"
-    for group in architecture.redundancy:
-        yield from _unfit_group(architecture, group, sources)
-
-
-def _unfit_group(
-    architecture: Architecture, group: Redundancy, sources: Mapping[str, ErrorSource]
-) -> Iterator[str]:
-    text = ", ".join(group.sensors)
-    members = [sensor for sensor in architecture.sensors if sensor.name in group.sensors]
-    if len(members) < len(group.sensors):
-        yield f"the redundant group ({text}) names a sensor that is not there"
-    if group.common_cause == "independent":
-        return
-    if any(sensor.name in sources for sensor in members):
-        yield f"a replaced sensor has no common cause with others: ({text})"
-    if not all(isinstance(sensor, Odometer | SatelliteReceiver) for sensor in members):
-        yield f"only odometers and satellite receivers have bursts to share: ({text})"
-    if len({_model(sensor) for sensor in members}) > 1:
-        yield f"sensors with common causes are alike but for their names: ({text})"
-
-
-def _model(sensor: Sensor) -> tuple[str, str]:
-    """Kind and parameters of a sensor, without its name, source and treatment when missing."""
-    values = dataclasses.asdict(sensor)
-    for name in ("name", "source", "missing", "failure_rate_per_h"):
-        values.pop(name, None)
-    return type(sensor).__name__, repr(values)
+        if _group_of(architecture, sensor.name).common_cause != "independent":
+            raise InputError(
+                f"{sensor.name!r} is replaced: it has no common cause with others",
+                where="sources",
+                cure='common_cause = "independent", share = 0.0',
+            )

@@ -33,7 +33,7 @@ from sbas.fusion.simulation.sensor_errors import NO_SOURCES, ErrorSource, draw_s
 from sbas.fusion.simulation.weighted_fusion import fused_errors, over_axes
 from sbas.fusion.simulation.weights import (
     error_variances,
-    fusion_weights,
+    given_weights,
     inverse_variance_weights,
 )
 from sbas.fusion.states import states_of
@@ -192,7 +192,7 @@ def _prepared(
         if tested or architecture.weights != "fixed":
             variances = error_variances(architecture, sources=sources)
         if architecture.weights == "fixed":
-            weights = fusion_weights(architecture)
+            weights = given_weights(architecture)
         else:
             weights = inverse_variance_weights(variances)
     true_position = epoch_positions_m(architecture)

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sbas.exceptions import ModelError
-from sbas.fusion.architecture.architecture_check import check_architecture, in_space
+from sbas.fusion.architecture.architecture_check import in_space
 from sbas.fusion.architecture.model import (
     Accelerometer,
     Architecture,
@@ -95,29 +95,19 @@ def inverse_variance_weights(variances: Floats) -> Floats:
     return weights
 
 
-def fusion_weights(
-    architecture: Architecture, *, sources: Mapping[str, ErrorSource] = NO_SOURCES
-) -> Floats:
-    """Weights of the sensors on each axis, among those that measure it.
+def given_weights(architecture: Architecture) -> Floats:
+    """Fixed weights that add up to 1 on each axis, among the sensors that measure it.
 
     Parameters
     ----------
-    architecture : with the rule of its weights.
-    sources : of sensors whose errors replace their model.
+    architecture : sound by `check_architecture`, with weights = "fixed".
 
     Returns
     -------
-    (a, n) or, with "per_epoch", (a, t, n) weights [1] that add up to 1 over the sensors.
-
-    Raises
-    ------
-    ModelError : as `error_variances` and `check_architecture`.
+    (a, n) weights [1].
     """
-    check_architecture(architecture)
-    if architecture.weights == "fixed":
-        shares = np.where(_measured(architecture), architecture.fixed_weights, 0.0)
-        return np.asarray(shares / shares.sum(axis=-1, keepdims=True))
-    return inverse_variance_weights(error_variances(architecture, sources=sources))
+    shares = np.where(_measured(architecture), architecture.fixed_weights, 0.0)
+    return np.asarray(shares / shares.sum(axis=-1, keepdims=True))
 
 
 # --- variances --------------------------------------------------------------------------------

@@ -15,6 +15,8 @@ from sbas.reporting.content import Cell, Section, Table, Tone, table
 from sbas.reporting.drawn import drawn
 
 SHOWN = 40
+"""Combinations listed; critical ones are listed beside them."""
+
 _TONES: dict[str, Tone] = {"critical": "bad", "always there": "bad", "not critical": "good",
                            "impossible": "good"}  # fmt: skip
 
@@ -60,7 +62,9 @@ def _table(found: CausalAnalysis) -> Table:
     there = f"p_{critical.target.lower()}_at_entry"
     rows: list[tuple[Cell | str, ...]] = []
     ordered = critical.table.sort_values("epochs", ascending=False, kind="stable")
-    for name, row in ordered.head(SHOWN).iterrows():
+    # However rare, a critical combination is not left out.
+    kept = (np.arange(len(ordered)) < SHOWN) | ordered["verdict"].eq("critical").to_numpy()
+    for name, row in ordered[kept].iterrows():
         verdict = str(row["verdict"])
         rows.append(
             (
@@ -70,7 +74,7 @@ def _table(found: CausalAnalysis) -> Table:
                 _time(row["reach_q05_s"]),
             )
         )  # fmt: skip
-    rest = len(ordered) - SHOWN
+    rest = int((~kept).sum())
     target = critical.target
     return table(
         "Combinations that occurred, the most frequent first",
@@ -80,7 +84,7 @@ def _table(found: CausalAnalysis) -> Table:
         "Critical: at least 5 events and a lower bound of the incidence above 1 %. Median time: of "
         f"the event, given that it comes; 5 % by: when 5 % of all episodes are {target}, entry "
         "included, 0 where they begin so. A dash: not estimable, with fewer than 5 events.",
-        *([f"{count(rest)} rarer combinations are left out."] if rest > 0 else []),
+        *([f"{count(rest)} rarer combinations, none critical, are left out."] if rest else []),
     )
 
 

@@ -205,6 +205,13 @@ def test_bytes_that_are_no_text(tmp_path: Path) -> None:
     assert "did you mean 'galoroi'?" in caught.value.cure
 
 
+def test_a_path_of_keys_is_a_model_error(tmp_path: Path) -> None:
+    deep = ".".join(["a"] * 2000)
+    for text in (f"{deep} = 1\n{TEXT}", f"{TEXT}\n[meta.{deep}]\n"):
+        with pytest.raises(ModelError, match="too deep"):
+            load_model(file_of(tmp_path, text))
+
+
 def test_keys_of_other_programs_stay_in_the_notes(tmp_path: Path) -> None:
     path = tmp_path / "m.json"
     dump_model(load_model(file_of(tmp_path, TEXT)), path)

@@ -37,7 +37,8 @@ SHARES = st.floats(0.0, 1.0)
 @st.composite
 def bursts(draw: st.DrawFn, *, largest: float = 10.0) -> Bursts:
     low, high = sorted((draw(st.floats(0.0, largest)), draw(st.floats(0.0, largest))))
-    return Bursts(draw(st.floats(0.0, 10.0)), draw(SIZES), low, high)
+    rate = draw(st.floats(0.0, 10.0)) if high > 0 or largest == 0 else 0.0
+    return Bursts(rate, draw(SIZES), low, high)
 
 
 @st.composite

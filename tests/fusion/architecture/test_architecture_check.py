@@ -223,7 +223,14 @@ WRONG: dict[str, tuple[Architecture, str, str]] = {
     ),
     "an outage of some size": (
         _of(ODO, replace(GPS, outage=Bursts(0.01, 6.0, 0.0, 3.0))),
-        "sensors.gps.outage.largest", "largest = 0.0",
+        "sensors.gps.outage.largest", "leave out",
+    ),
+    "slips of no size": (
+        _of(Odometer("odo", slip=Bursts(0.02, 3.0))), "sensors.odo.slip.largest", "rate_per_s = 0",
+    ),
+    "multipath of no size": (
+        _of(ODO, replace(GPS, multipath=Bursts(0.02, 3.0))), "sensors.gps.multipath.largest",
+        "write smallest and largest",
     ),
     "redundancy of an unknown sensor": (
         _group("odo", "odo22"), "redundancy[0].sensors", "did you mean 'odo2'",

@@ -12,17 +12,15 @@ from sbas.fusion.critical.episodes import (
     Episodes,
     Target,
     combination_keys,
-    combination_name,
     extract_episodes,
     states_of_key,
 )
-
-CODES = {"N": 0, "D": 1, "U": 2, "-": -1}
+from sbas.fusion.states import LETTERS, combination_name
 
 
 def states(*rows: str) -> np.ndarray:
     """(rows, t, 1) codes, a row a sensor, or the output."""
-    return np.array([[CODES[c] for c in row] for row in rows], np.int8)[:, :, np.newaxis]
+    return np.array([[LETTERS[c] for c in row] for row in rows], np.int8)[:, :, np.newaxis]
 
 
 def cut(sensors: tuple[str, ...], output: str, **options: object) -> Episodes:
@@ -48,7 +46,8 @@ def test_the_three_endings_by_hand() -> None:
         ("NU", 6, 3, -1, 0),  # U on entry: not at risk
     ]
     np.testing.assert_array_equal(found.there_at_entry, [False, False, False, True])
-    np.testing.assert_array_equal(found.time_s, [0.5, 1.0, 0.5, 0])
+    np.testing.assert_array_equal(found.steps, [1, 2, 1, 0])
+    assert found.step_s == 0.5
     # N, DA, U and silent epochs of each
     np.testing.assert_array_equal(
         found.output_epochs.T, [[1, 0, 0, 0], [0, 3, 1, 0], [0, 1, 0, 0], [1, 1, 1, 0]]

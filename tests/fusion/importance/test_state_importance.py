@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from sbas.exceptions import InputError
+from sbas.fusion.critical.run_bootstrap import resampled
 from sbas.fusion.fused_runs import FusedRuns
 from sbas.fusion.importance.importance_results import LEAST_RUNS, Bounded
 from sbas.fusion.importance.state_importance import importance_by_state, independent_importance
-from sbas.fusion.importance.top_shares import resampled_weights
 from sbas.fusion.logic.published_tables import figure_9
 
 D = np.array([0.2, 0.2, 0.15])
@@ -168,7 +168,7 @@ def test_intervals_cover_the_truth_from_twenty_runs() -> None:
         caught = 0
         for draw in range(400):
             bursts = np.where(rng.random(500) < expected / 500, rng.geometric(0.2, 500), 0)
-            shares = np.concatenate([w @ bursts for w in resampled_weights(500, 200, draw)]) / 500
+            shares = resampled(500, 200, np.random.default_rng(draw)).astype(float) @ bursts / 500
             low, high = np.quantile(shares, [0.025, 0.975])
             caught += low <= 5 * expected / 500 <= high
         assert caught / 400 == pytest.approx(

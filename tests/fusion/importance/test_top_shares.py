@@ -17,7 +17,6 @@ from sbas.fusion.importance.top_shares import (
     fixed_by_table,
     independent_shares,
     marked,
-    resampled_weights,
     run_counts,
 )
 from sbas.fusion.logic.published_tables import figure_9
@@ -144,16 +143,6 @@ def test_counts_by_hand() -> None:
     alone = counts.shares(np.array([[0.0, 1.0]])).first()
     assert math.isnan(alone.given[0, 0])
     assert math.isnan(alone.change[0, 1])
-
-
-def test_every_replicate_draws_as_many_runs() -> None:
-    chunks = list(resampled_weights(3_000_000, 2, 1))
-    assert [len(c) for c in chunks] == [1, 1]
-    weights = np.concatenate(list(resampled_weights(50, 400, 3)))
-    assert weights.shape == (400, 50)
-    assert (weights.sum(axis=1) == 50).all()
-    # Multinomial: mean 1 and variance 1 - 1/50 of each count; 20000 counts, 5 sigma.
-    assert weights.var() == pytest.approx(0.98, abs=5 * math.sqrt(3 / 20_000))
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -14,7 +15,6 @@ from hypothesis.extra import numpy as hnp
 from sbas.exceptions import InputError
 from sbas.fusion.logic.boolean_form import (
     Implicant,
-    covered,
     holds,
     minimal_cuts,
     prime_implicants,
@@ -42,6 +42,15 @@ def tables(monotone: bool) -> st.SearchStrategy[TruthTable]:
         return hnp.arrays(np.int8, 3**n, elements=levels).map(lambda o: made(n, o))
 
     return st.integers(1, 4).flatmap(of_size)
+
+
+def covered(implicants: Sequence[Implicant], sensors: int) -> np.ndarray:
+    """(3^n,) combinations that any of the implicants makes true."""
+    states = combination_states(np.arange(3**sensors), sensors).T
+    lowest, highest = (np.array([getattr(i, end) for i in implicants]).reshape(-1, sensors)
+                       for end in ("lowest", "highest"))  # fmt: skip
+    inside = (states[:, None] >= lowest) & (states[:, None] <= highest)
+    return inside.all(axis=2).any(axis=1)
 
 
 # --- Figure 9 ---------------------------------------------------------------------------------

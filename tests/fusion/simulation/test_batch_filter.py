@@ -166,25 +166,6 @@ def test_gate_refuses_what_is_beyond_it() -> None:
 # --- what cannot be filtered ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"speed_mps": 0.0},
-        {"position_m": 0.0},
-        {"acceleration_mps2_per_rthz": 0.0},
-        {"position_m": math.nan},
-        {"speed_mps": math.inf},
-        {"initial_speed_mps": -0.1},
-        {"gate": 0.0},
-        {"gate": math.nan},
-    ],
-)
-def test_refused_tuning(change: dict[str, float]) -> None:
-    with pytest.raises(InputError, match="noise above 0") as error:
-        filtered_errors(*zeros(2, 2), **options(replace(TUNING, **change)))
-    assert f"filter.{next(iter(change))}" in error.value.where
-
-
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_refused_errors(value: float) -> None:
     for part in range(2):

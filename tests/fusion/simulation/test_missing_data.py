@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from sbas.exceptions import ModelError
 from sbas.fusion.architecture.model import (
     Accelerometer,
     Architecture,
@@ -111,12 +110,6 @@ def test_across_the_track_the_train_stands_still() -> None:
     assert np.isnan(held["odo"].error_m[1:]).all()
     moved = used_errors(runs, {"gnss": Missing("extrapolate", "odo")}, TRUE_M)["gnss"]
     assert moved.error_m[:, 3, 0] == pytest.approx([2.7, NAN, NAN], nan_ok=True)
-
-
-@pytest.mark.parametrize("by", ["", "radar", "gnss"])
-def test_help_from_no_other_sensor_is_refused(by: str) -> None:
-    with pytest.raises(ModelError, match="name one of odo"):
-        _gnss(Missing("extrapolate", by))
 
 
 def test_infinite_errors_stay_infinite_or_missing() -> None:

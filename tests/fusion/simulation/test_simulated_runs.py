@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,9 @@ from sbas.fusion.architecture.model import (
     InertialUnit,
     Missing,
     Odometer,
+    Phase,
     SatelliteReceiver,
+    SpeedProfile,
     Thresholds,
     Unmodelled,
 )
@@ -239,6 +242,21 @@ def test_hysteresis_and_shorter_steps() -> None:
 def test_numbers_out_of_range_are_refused(wrong: dict[str, int]) -> None:
     with pytest.raises(InputError, match=next(iter(wrong))):
         simulate_runs(ARCH1, **wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [
+        ({"step_s": 0.3}, "step_s"),
+        ({"profile": SpeedProfile((Phase(1.0, -1.0),))}, "profile.phases"),
+        ({"sensors": (*ARCH1.sensors[:2], SatelliteReceiver("gps", tau_s=0.0))}, "gps.tau_s"),
+        ({"weights": "fixed", "fixed_weights": (0.2, 0.3, 0.6)}, "fixed_weights"),
+    ],
+)
+def test_an_unsound_architecture_is_refused(change: dict[str, Any], where: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        simulate_runs(replace(ARCH1, **change), runs=2)
+    assert where in caught.value.where
 
 
 def test_sensors_without_a_model_are_named_unless_their_errors_are_given() -> None:

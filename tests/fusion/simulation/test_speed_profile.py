@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sbas.exceptions import InputError
 from sbas.fusion.architecture.model import Phase, SpeedProfile
 from sbas.fusion.simulation.speed_profile import (
     accelerations_mps2,
@@ -58,19 +57,3 @@ def test_phase_ends_within_a_substep() -> None:
 def test_last_phase_goes_on() -> None:
     profile = SpeedProfile((Phase(1.0, 0.0),), start_speed_mps=20.0)
     assert (speeds_mps(profile, 0.1, 50) == 20.0).all()
-
-
-def test_no_train_runs_backwards() -> None:
-    with pytest.raises(InputError, match="runs backwards"):
-        speeds_mps(DEFAULT, 0.1, 1001)
-    with pytest.raises(InputError, match="runs backwards"):
-        speeds_mps(SpeedProfile((Phase(1.0, float("nan")),)), 0.1, 10)
-
-
-@pytest.mark.parametrize(
-    "phases", [(), (Phase(0.0, 1.0),), (Phase(5.0, 1.0), Phase(5.0, 0.0)),
-               (Phase(5.0, 1.0), Phase(3.0, 0.0))],
-)  # fmt: skip
-def test_phases_out_of_order(phases: tuple[Phase, ...]) -> None:
-    with pytest.raises(InputError, match="one after the other"):
-        speeds_mps(SpeedProfile(phases), 0.1, 10)

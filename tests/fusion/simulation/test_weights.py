@@ -23,7 +23,7 @@ from sbas.fusion.architecture.model import (
 from sbas.fusion.fused_runs import Floats
 from sbas.fusion.simulation.weights import (
     error_variances,
-    fusion_weights,
+    given_weights,
     inverse_variance_weights,
 )
 
@@ -42,18 +42,22 @@ IN_SPACE = replace(
 )
 
 
+def eq_4_weights(architecture: Architecture) -> Floats:
+    return inverse_variance_weights(error_variances(architecture))
+
+
 def test_pooled_variances_and_weights_of_the_page() -> None:
     # Page, section 11: exact, no outage.
     sd = np.sqrt(error_variances(ARCH1))
     assert sd[0] == pytest.approx([0.8288, 1.2741, 0.7071], abs=5e-5)
-    weights = fusion_weights(ARCH1)
+    weights = eq_4_weights(ARCH1)
     assert weights.shape == (1, 3)
     assert weights[0] == pytest.approx([0.3575, 0.1513, 0.4912], abs=5e-5)
 
 
 def test_weights_at_each_epoch_of_the_page() -> None:
     per_epoch = replace(ARCH1, weights="per_epoch")
-    weights = fusion_weights(per_epoch)
+    weights = eq_4_weights(per_epoch)
     assert weights.shape == (1, 100, 3)
     assert weights[0, [0, 19, 99]] == pytest.approx(
         np.array([[0.004, 0.996, 0.000], [0.490, 0.480, 0.030], [0.196, 0.052, 0.752]]), abs=5e-4
@@ -100,25 +104,25 @@ def test_dead_reckoning_variances_equal_sums_of_squares() -> None:
 
 
 def test_weights_on_each_axis_are_shared_by_the_sensors_that_measure_it() -> None:
-    weights = fusion_weights(IN_SPACE)
+    weights = eq_4_weights(IN_SPACE)
     assert weights[0] == pytest.approx([0.3575, 0.1513, 0.4912], abs=5e-5)
     # 0.1513/(0.1513 + 0.4912), since sensors keep their proportions
     assert weights[1] == pytest.approx([0, 0.2355, 0.7645], abs=1e-4)
     assert weights[2] == pytest.approx(weights[1])
-    fixed = fusion_weights(replace(IN_SPACE, weights="fixed", fixed_weights=(0.5, 0.2, 0.3)))
+    fixed = given_weights(replace(IN_SPACE, weights="fixed", fixed_weights=(0.5, 0.2, 0.3)))
     assert fixed == pytest.approx(np.array([[0.5, 0.2, 0.3], [0, 0.4, 0.6], [0, 0.4, 0.6]]))
 
 
 def test_weights_with_faults_come_from_a_pilot_that_always_gives_the_same() -> None:
     with_faults = replace(ARCH1, weights="with_faults")
-    weights = fusion_weights(with_faults)
+    weights = eq_4_weights(with_faults)
     # Page: .280/.452/.268 from 2000 runs, whose weights scatter by .009 (20 samples of 2000).
     assert weights[0] == pytest.approx([0.280, 0.452, 0.268], abs=0.027)
-    assert np.array_equal(weights, fusion_weights(with_faults))
+    assert np.array_equal(weights, eq_4_weights(with_faults))
 
 
 def test_without_faults_the_pilot_finds_the_exact_variances() -> None:
-    never = Bursts(0.0, 1.0, 0.0, 0.0)
+    never = Bursts(0.0, 1.0)
     quiet = replace(
         ARCH1,
         weights="with_faults",
@@ -130,14 +134,6 @@ def test_without_faults_the_pilot_finds_the_exact_variances() -> None:
     )
     # 8000 runs, each about one degree of freedom for dead reckoning: 4 sd are 4*sqrt(2/8000).
     assert error_variances(quiet) == pytest.approx(error_variances(ARCH1), rel=0.064)
-
-
-@pytest.mark.parametrize(
-    "weights", [(0.2, 0.3, 0.6), (-0.1, 0.5, 0.6), (float("nan"), 0.5, 0.5), (0.5, 0.5)]
-)
-def test_fixed_weights_that_make_no_mean_are_refused(weights: tuple[float, ...]) -> None:
-    with pytest.raises(ModelError, match="weights"):
-        fusion_weights(replace(ARCH1, weights="fixed", fixed_weights=weights))
 
 
 def _alternating(_: np.random.Generator, runs: int) -> Floats:
