@@ -20,7 +20,13 @@ HERE = Path(__file__).resolve().parent
 def execute(source: Path, target: Path) -> None:
     """Run one notebook in the folder it lies in, and write it with its outputs."""
     notebook = nbformat.read(source, as_version=4)
-    client = NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(HERE)}})
+    client = NotebookClient(
+        notebook,
+        timeout=300,
+        resources={"metadata": {"path": str(HERE)}},
+        # How a cell's prints arrive depends on timing; joined they are the same each time.
+        coalesce_streams=True,
+    )
     client.execute()
     notebook.metadata = {
         "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}

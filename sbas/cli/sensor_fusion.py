@@ -41,10 +41,14 @@ def multisensor_files(
         float | None,
         typer.Option(help="Take the direction of a trajectory above this speed, in m/s."),
     ] = None,
+    receiver: Annotated[
+        str | None, typer.Option(help="Sensor that the recording stands for, of several.")
+    ] = None,
     resampling: Annotated[
         Literal["replay", "block_bootstrap"],
         typer.Option(help="Draw windows of the recording, or blocks of it."),
     ] = "replay",
+    accept: inputs.Accept = None,
     target: Annotated[
         Literal["U", "DA"], typer.Option(help="Output state whose reaching is the event.")
     ] = "U",
@@ -83,7 +87,7 @@ def multisensor_files(
         opened = inputs.open_recording(
             recording, truth, reading, repairing, quiet=quiet, whole=True
         )
-    elif (azimuth, direction_above) != (None, None) or truth != inputs.TruthGiven():
+    elif (azimuth, direction_above, receiver) != (None,) * 3 or truth != inputs.TruthGiven():
         raise InputError(
             "a truth, track or direction without a recording",
             cure="--recording FILE --truth LAT,LON,H --azimuth DEGREES",
@@ -101,8 +105,10 @@ def multisensor_files(
             track=None if opened is None else opened.track,
             azimuth_deg=azimuth,
             direction_above_mps=direction_above,
+            receiver=receiver,
             resampling=resampling,
             target=target,
+            accept_findings=accept or (),
             progress=callback,
         )
     if tree is not None:

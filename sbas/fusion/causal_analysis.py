@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -20,18 +20,21 @@ from sbas.fusion.fused_runs import FusedRuns
 from sbas.fusion.importance.importance_results import StateImportances
 from sbas.fusion.importance.state_importance import importance_by_state
 from sbas.fusion.logic.boolean_form import two_line_form
+from sbas.fusion.logic.interval_rules import MAX_SENSORS
 from sbas.fusion.logic.truth_table import TruthTable
 from sbas.fusion.recorded.recorded_bootstrap import RecordedSource, block_bootstrapped, replayed
 from sbas.fusion.recorded.recorded_errors import RecordedErrors, along_track_errors
 from sbas.fusion.recorded.state_sources import combination_source
 from sbas.fusion.recorded.tree_events import failed_or, hardware_probability, state_fault_tree
 from sbas.fusion.simulation.simulated_runs import simulate_runs
-from sbas.fusion.states import StateShares, shares
+from sbas.fusion.states import NO_DATA, StateShares, shares
+from sbas.numerals import upward
 from sbas.recording import Recording
 from sbas.track import Track
 from sbas.truth import Truth
 
 Resampling = Literal["replay", "block_bootstrap"]
+MOST_BYTES = 6_000_000_000
 LEAST_RUNS = 2
 """Intervals draw whole runs again: a single one has none."""
 
@@ -48,7 +51,8 @@ class CausalAnalysis:
     shares : availability, safety and hazard of the output.
     critical : combinations and their times.
     table : truth table of so many sensors, N where no sensor is U and one is N, U where all are.
-    importance : of the sensors' levels, under three laws.
+    importance : of the sensors' levels, under three laws; None where no epoch has a state of
+        every sensor.
     recorded : of the recording that stood for a receiver, None without one.
     resampled : how its errors were drawn.
     findings : of architecture, recording and figures.
@@ -60,7 +64,7 @@ class CausalAnalysis:
     shares: StateShares
     critical: CriticalTimes
     table: TruthTable
-    importance: StateImportances
+    importance: StateImportances | None
     recorded: RecordedErrors | None
     resampled: RecordedSource | None
     findings: tuple[Finding, ...]
@@ -103,14 +107,15 @@ class CausalAnalysis:
     def fault_tree(
         self,
         *,
-        condition: Literal["isU", "notN"] = "isU",
+        condition: Literal["isU", "notN"] | None = None,
         critical_at: Literal["reach_q05_s", "event_q05_s"] | None = "reach_q05_s",
     ) -> HybridFaultTree:
         """The states seen here as a fault tree for `sbas.depend`, over the time of one run.
 
         Parameters
         ----------
-        condition : top event of the truth table.
+        condition : top event of the truth table; None: "isU", or "notN" where the critical times
+            are those to DA.
         critical_at : column of the critical times at which a combination counts as lasting too
             long: "reach_q05_s" has those that are unacceptable at entry (with more than 5 % of
             them the gate is true at once), "event_q05_s" leaves them out; None: no such gates.
@@ -125,6 +130,7 @@ class CausalAnalysis:
         ------
         InputError : a condition that these runs never met.
         """
+        condition = condition or ("isU" if self.critical.target == "U" else "notN")
         times = self.critical.table.loc[list(self.critical.critical), critical_at or "reach_q05_s"]
         step_s = self.architecture.step_s
         return state_fault_tree(
@@ -159,7 +165,8 @@ class CausalAnalysis:
             "seed": self.seed,
             "output": self.shares.to_dict(),
             "time_to_alert_s": self.time_to_alert_s,
-            "importance": self.importance.to_dict(),
+            "weights": self.runs.weights.tolist() if self.runs.weights.size else None,
+            "importance": None if self.importance is None else self.importance.to_dict(),
             "hardware_failure_in_a_run": self.hardware,
             "hazard_with_hardware": self.hazard_with_hardware,
             "recorded": None if self.recorded is None else self.recorded.to_dict(),
@@ -177,9 +184,10 @@ class CausalAnalysis:
             f"  output N {out.nominal / out.epochs:.4f}, DA {out.degraded / out.epochs:.4f}, "
             f"U {out.unacceptable / out.epochs:.4f}, no data {out.no_data / out.epochs:.4f}",
             f"  available {out.available:.4f}, safe {out.safe:.4f}, hazard {out.hazard:.4f}",
+            *self._hardware_line(),
             f"  combinations of {', '.join(found.names)} (N, D for DA, U, - for no data): "
             f"{sum('-' not in name for name in found.table.index)} of {3 ** len(found.names)} met, "
-            f"{len(found.critical)} critical",
+            f"{sum('-' not in name for name in found.critical)} of them critical",
         ]
         for name in found.critical:
             row = found.table.loc[name]
@@ -192,6 +200,13 @@ class CausalAnalysis:
         lines += [str(finding) for finding in self.findings]
         return "\n".join(lines)
 
+    def _hardware_line(self) -> Iterator[str]:
+        if any(self.hardware.values()):
+            yield (
+                f"  hazard, or hardware of any sensor failed by the end of a run: at most "
+                f"{upward(self.hazard_with_hardware, 4)}"
+            )
+
     def _recorded_line(self) -> Iterator[str]:
         if self.recorded is None or self.resampled is None:
             return
@@ -200,6 +215,14 @@ class CausalAnalysis:
             f"  receiver: errors along the track of {files or 'a recording'}, "
             f"{self.resampled.kind.replace('_', ' ')}; U {self.resampled.recorded_u_share:.4f} "
             f"recorded, {self.resampled.drawn_u_share:.4f} drawn"
+        )
+        counts = self.recorded.counts
+        yield (
+            f"  its horizontal error by its level, of {counts.judged:,} epochs: hazard (HMI) "
+            f"{counts.hazard:,}, detected {counts.detected:,}, safe or available "
+            f"{counts.safe + counts.available:,}, false alarms "
+            f"{counts.false_alarm_n + counts.false_alarm_da:,}, misleading without hazard "
+            f"{counts.misleading:,}; levels take no part in the fusion"
         )
 
 
@@ -217,6 +240,7 @@ def multisensor(
     resampling: Resampling = "replay",
     target: Target = "U",
     replicates: int = 1000,
+    accept_findings: Iterable[str] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> CausalAnalysis:
     """Which sensor faults spoil the position of an architecture, and how fast?
@@ -232,6 +256,7 @@ def multisensor(
     resampling : windows of the recording, or blocks of it.
     target : output state whose reaching is the event.
     replicates : of the bootstrap over runs.
+    accept_findings : codes of errors in the recording to accept as warnings.
     progress : called with (runs done, runs in all).
 
     Returns
@@ -241,8 +266,8 @@ def multisensor(
     Raises
     ------
     ModelError : a model that cannot be simulated, such as one with a sensor without error model.
-    InputError : too few runs, a recording whose errors have no sign, or what belongs to a
-        recording without one.
+    InputError : too few runs or too many for the memory, too many sensors, a recording whose
+        errors have no sign, or what belongs to a recording without one.
 
     References
     ----------
@@ -266,6 +291,7 @@ def multisensor(
             "leave it out: all sensors are simulated then",
         )  # fmt: skip
     findings = list(check_architecture(architecture))
+    _check_size(architecture, runs, replicates)
     recorded = resampled = None
     sources = {}
     if recording is not None:
@@ -273,6 +299,7 @@ def multisensor(
         recorded = along_track_errors(
             recording, truth=truth, track=track, azimuth_deg=azimuth_deg,
             direction_above_mps=direction_above_mps, thresholds=architecture.thresholds,
+            accept_findings=accept_findings,
         )  # fmt: skip
         drawn_from = replayed if resampling == "replay" else block_bootstrapped
         resampled = drawn_from(
@@ -286,13 +313,62 @@ def multisensor(
     critical = critical_times(
         fused.sensor_state, fused.output_state, names=fused.names, step_s=fused.step_s,
         target=target, convex=convexity_holds(architecture), replicates=replicates, seed=seed,
+        # A window of a recording begins inside whatever lasts there: that entry was not seen.
+        starts_fresh=not sources,
     )  # fmt: skip
     table = two_line_form(fused.names)
-    importance = importance_by_state(table, fused, replicates=replicates, seed=seed)
+    complete = (fused.sensor_state != NO_DATA).all(axis=0) & (fused.output_state != NO_DATA)
+    importance = None
+    if complete.any():
+        importance = importance_by_state(table, fused, replicates=replicates, seed=seed)
+    else:
+        findings.append(_never_complete(fused))
+    if sources and fused.weights.size and architecture.weights != "fixed":
+        findings.append(_weights_of_recording(fused))
     findings += critical.findings
     return CausalAnalysis(
         architecture, fused, seed, shares(fused.output_state, fused.declared_usable), critical,
         table, importance, recorded, resampled, tuple(dict.fromkeys(findings)),
+    )  # fmt: skip
+
+
+def _check_size(architecture: Architecture, runs: int, replicates: int) -> None:
+    """Refuse what a truth table or the memory has no room for, before anything is simulated."""
+    n = len(architecture.sensors)
+    if n > MAX_SENSORS:
+        raise InputError(
+            f"a truth table has at most {MAX_SENSORS} sensors", where=architecture.name,
+            evidence=f"{n} sensors", cure="leave some out, or fuse groups on their own",
+        )  # fmt: skip
+    # States, errors and keys of the epochs, and the draws of runs for the intervals.
+    bytes_a_run = architecture.epochs * (3 * n + 40) + 4 * (replicates + 1)
+    if runs * bytes_a_run > MOST_BYTES:
+        raise InputError(
+            "so many runs do not fit into the memory", where="runs",
+            evidence=f"{runs:,} runs take some {runs * bytes_a_run / 1e9:.0f} GB",
+            cure=f"at most {MOST_BYTES // bytes_a_run:,} runs, or fewer replicates",
+        )  # fmt: skip
+
+
+def _never_complete(fused: FusedRuns) -> Finding:
+    silent = [
+        name for name, state in zip(fused.names, fused.sensor_state, strict=True)
+        if (state == NO_DATA).all()
+    ]  # fmt: skip
+    return Finding(
+        "E15", "warning", "no epoch has a state of every sensor: importance is not estimable",
+        where=", ".join(silent), evidence=f"{fused.runs:,} runs of {fused.epochs:,} epochs",
+        cure="leave the silent sensor out of the architecture",
+    )  # fmt: skip
+
+
+def _weights_of_recording(fused: FusedRuns) -> Finding:
+    mean = fused.weights.reshape(-1, len(fused.names)).mean(axis=0)
+    return Finding(
+        "E28", "info",
+        "the recorded receiver's variance, its faults included, sets the weights of the fusion",
+        evidence=", ".join(f"{n} {w:.3f}" for n, w in zip(fused.names, mean, strict=True)),
+        cure='weights = "fixed" keeps those of another design',
     )  # fmt: skip
 
 
@@ -307,5 +383,5 @@ def _receiver_of(architecture: Architecture, asked: str | None) -> str:
         "a recording stands for one satellite receiver",
         where=architecture.name,
         evidence=f"asked for {asked!r}, there are {', '.join(receivers) or 'none'}",
-        cure=f"receiver={receivers[0] if receivers else 'NAME'!r}",
+        cure=f"--receiver {receivers[0]}" if receivers else "a sensor of kind gnss",
     )

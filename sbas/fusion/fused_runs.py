@@ -5,7 +5,7 @@ Arrays run over time first, then over runs: recursions in time work on vectors o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,8 @@ class FusedRuns:
     output_error_m : (t, r) signed error of the fused position [m], of the worst axis, or its norm;
         NaN without data.
     declared_usable : (t, r) the system says that its position may be used.
+    weights : (a, n) of the sensors in the mean on each axis, or (a, t, n) by epoch [1]; empty
+        with a Kalman filter.
     """
 
     names: tuple[str, ...]
@@ -55,6 +57,7 @@ class FusedRuns:
     output_state: States
     output_error_m: Floats
     declared_usable: Bools
+    weights: Floats = field(default_factory=lambda: np.empty(0))
 
     @property
     def runs(self) -> int:

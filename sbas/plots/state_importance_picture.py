@@ -116,11 +116,11 @@ def sensitivity_bars(sensitivity: ParameterSensitivity, *, ax: Axes | None = Non
     """
     rows = sorted(sensitivity.rows, key=lambda row: -row.total)
     shown = rows[:MOST_ROWS]
-    with drawing(None if ax is None else [ax], _sheet(len(rows), 0.36, left=1.3, bottom=0.44)) as (
+    with drawing(None if ax is None else [ax], _sheet(len(rows), 0.36, left=1.95, bottom=0.44)) as (
         ax,
     ):
         ax.set_xlabel(f"share of the variance of {sensitivity.of} [1]")
-        ax.set_yticks(range(len(shown)), [_short(row.path, 22) for row in shown])
+        ax.set_yticks(range(len(shown)), [_short(row.path, 36) for row in shown])
         ax.set_ylim(len(shown) - 0.45, -0.55)
         ax.grid(visible=False, axis="y")
         if sensitivity.undefined:

@@ -82,8 +82,9 @@ def _verdict(found: CausalAnalysis) -> Section:
             Tile("Available", f"{100 * out.available:.2f} %", "output N or DA, detected or not"),
             Tile("Safe", f"{100 * out.safe:.2f} %", "output N and declared usable"),
             Tile("Hazard", f"{100 * out.hazard:.2f} %",
-                 f"output U and declared usable; P(U) {found.importance.top('simulated', 'isU')}"),
-            Tile("Critical combinations", count(len(found.critical.critical)),
+                 f"output U and declared usable{_interval(found)}"),
+            Tile("Critical combinations",
+                 count(sum("-" not in name for name in found.critical.critical)),
                  f"of {3 ** len(found.runs.names)}"),
         ),
         tables=(_output(found), _hardware(found)),
@@ -105,6 +106,13 @@ def _alert(found: CausalAnalysis) -> str:
         f"An alert that must come before 5 % of the episodes of any combination are {target} has "
         f"{has}: {names}."
     )
+
+
+def _interval(found: CausalAnalysis) -> str:
+    """Interval of P(U) by whole runs, where there is one."""
+    if found.importance is None:
+        return ""
+    return f"; P(U) {found.importance.top('simulated', 'isU')}"
 
 
 def _output(found: CausalAnalysis) -> Table:

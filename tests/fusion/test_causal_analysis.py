@@ -17,7 +17,12 @@ import sbas
 from sbas.dependability import depend
 from sbas.exceptions import InputError, ModelError
 from sbas.fusion import CausalAnalysis, load_architecture, multisensor, presets
-from sbas.fusion.architecture.model import Architecture, Unmodelled
+from sbas.fusion.architecture.model import (
+    Architecture,
+    Odometer,
+    SatelliteReceiver,
+    Unmodelled,
+)
 from sbas.fusion.critical.critical_times import critical_times
 from sbas.fusion.states import DA, NO_DATA, N, U, states_of
 from sbas.laboratory.settings import LaboratorySettings
@@ -269,7 +274,7 @@ def test_critical_combinations_become_gates_that_can_only_add() -> None:
     assert answer.critical.critical
     tree = answer.fault_tree()
     rows = depend(tree).solutions[tree.name].rows
-    lasting = [f"{name} lasts" for name in answer.critical.critical]
+    lasting = [f"{name} or worse lasts" for name in answer.critical.critical]
     assert set(tree.cases) == {"isU", *lasting}
     for part in tree.cases:
         assert rows["TOP"].mean_unavailability >= rows[part].mean_unavailability
@@ -280,7 +285,7 @@ def test_critical_combinations_become_gates_that_can_only_add() -> None:
 
 
 def test_a_tree_of_what_never_happened_is_refused() -> None:
-    with pytest.raises(InputError, match="never seen to be"):
+    with pytest.raises(InputError, match="would mean not seen"):
         multisensor("arch1", runs=2, replicates=100).fault_tree(critical_at=None)
 
 
@@ -331,8 +336,8 @@ def test_a_recording_serves_the_filter_and_three_axes(model: str) -> None:
     ("missing", "words"),
     [
         ({"truth": None}, ("no truth", "--truth")),
-        ({"azimuth_deg": None}, ("direction of travel", "azimuth_deg")),
-        ({"receiver": "odo"}, ("one satellite receiver", "receiver='gps'")),
+        ({"azimuth_deg": None}, ("direction of travel", "--azimuth")),
+        ({"receiver": "odo"}, ("one satellite receiver", "--receiver gps")),
         ({"truth": None, "azimuth_deg": None}, ("no truth", "--truth")),
     ],
 )
@@ -354,3 +359,85 @@ def test_of_two_receivers_one_must_be_named() -> None:
     with pytest.raises(InputError, match="one satellite receiver"):
         multisensor(twin, **options)
     assert multisensor(twin, receiver="gps2", **options).recorded is not None
+
+
+def test_a_window_of_a_recording_begins_inside_what_lasts_there() -> None:
+    answer = of_laboratory()
+    runs, critical = answer.runs, answer.critical
+    seen = critical_times(
+        runs.sensor_state, runs.output_state, names=runs.names, step_s=runs.step_s,
+        starts_fresh=False, replicates=100, convex=True,
+    )  # fmt: skip
+    assert critical.table["episodes"].tolist() == seen.table["episodes"].tolist()
+    whole = critical_times(
+        runs.sensor_state, runs.output_state, names=runs.names, step_s=runs.step_s, replicates=100
+    )
+    # One episode of each run is that with which it begins.
+    assert whole.table["episodes"].sum() - critical.table["episodes"].sum() == answer.runs.runs
+
+
+def test_the_tree_of_times_to_da_has_not_n_at_its_top() -> None:
+    tree = found(target="DA").fault_tree(critical_at=None)
+    assert tree.top == "notN"
+    assert found().fault_tree(critical_at=None).top == "isU"
+
+
+def test_a_condition_that_was_never_met_makes_no_tree() -> None:
+    calm = replace(load_architecture("arch1"), duration_s=3.0)
+    answer = multisensor(calm, runs=20, replicates=100)
+    with pytest.raises(InputError, match="never"):
+        answer.fault_tree()
+
+
+def test_a_receiver_that_is_never_there_stops_nothing_but_importance() -> None:
+    silent = replace(SatelliteReceiver("gps"), interval_s=200.0)
+    arch1 = load_architecture("arch1")
+    tunnel = replace(arch1, sensors=(*arch1.sensors[:2], silent))
+    answer = multisensor(tunnel, **FEW)
+    assert answer.importance is None
+    assert answer.shares.no_data == 0
+    assert [f.where for f in answer.findings if "importance" in f.message] == ["gps"]
+    assert all(name.endswith("-") for name in answer.critical.table.index)
+    assert json.loads(json.dumps(answer.to_dict(), allow_nan=False))["importance"] is None
+
+
+def test_a_recording_tells_what_it_does_to_the_weights() -> None:
+    answer = of_laboratory()
+    told = [f.evidence for f in answer.findings if "weights of the fusion" in f.message]
+    weights = dict(zip(answer.runs.names, answer.runs.weights[0], strict=True))
+    assert told == [", ".join(f"{name} {weight:.3f}" for name, weight in weights.items())]
+    assert weights["gps"] < found().runs.weights[0, 2]
+    assert sum(weights.values()) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("sensors", "runs", "words"),
+    [(13, 2, "at most 12 sensors"), (3, 100_000_000, "do not fit into the memory")],
+)
+def test_what_has_no_room_is_refused_before_it_is_simulated(
+    sensors: int, runs: int, words: str
+) -> None:
+    many = tuple(Odometer(f"o{i}") for i in range(sensors - 1))
+    with pytest.raises(InputError, match=words) as refused:
+        multisensor(Architecture("wide", (*many, SatelliteReceiver("gps"))), runs=runs)
+    assert refused.value.cure
+
+
+def test_hardware_is_in_the_printed_answer_where_it_can_fail() -> None:
+    arch1 = load_architecture("arch1")
+    assert "hardware" not in str(found())
+    fragile = replace(
+        arch1, sensors=(replace(arch1.sensors[0], failure_rate_per_h=1.0), *arch1.sensors[1:])
+    )
+    answer = multisensor(fragile, **FEW)
+    assert f"at most {answer.hazard_with_hardware:.2}"[:12] in str(answer)
+
+
+def test_errors_of_a_recording_may_be_accepted_by_name() -> None:
+    far = FixedPoint(50.04, 15.77, 289.4, frame="ITRF2005 2009.7")
+    with pytest.raises(InputError) as refused:
+        of_laboratory(truth=far)
+    assert refused.value.code == "E12"
+    answer = of_laboratory(truth=far, accept_findings=["E12"])
+    assert answer.recorded is not None
+    assert answer.recorded.counts.hazard + answer.recorded.counts.detected > 1000

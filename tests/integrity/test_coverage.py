@@ -21,6 +21,8 @@ def test_the_upper_bound_covers_in_records_with_injected_failures() -> None:
             seed=seed,
             failure_rate_per_h=RATE_PER_H,
             failure_duration_s=(30.0, 30.0),
+            # Short: the bound counts events and needs no tau, whose simulation is the cost here.
+            decorrelation_time_s=4.0,
             sbas_frames=False,
         )
         truth = FixedPoint(lab.lat_deg, lab.lon_deg, lab.height_m, frame="simulated")

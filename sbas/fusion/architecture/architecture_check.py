@@ -37,6 +37,7 @@ from sbas.fusion.architecture.model import (
 from sbas.integrity.allocation_tree import nearest
 
 WEIGHT_TOLERANCE = 1e-9
+SMALLEST_WEIGHT = 1e-12
 
 _NOISES = {
     Odometer: ("scale_sd", "noise_mps"),
@@ -321,6 +322,11 @@ def _check_sum(architecture: Architecture) -> None:
     if total == 0:
         raise refuse("all weights are zero", "fixed_weights", str(weights),
                      "write weights that add up to 1")  # fmt: skip
+    if any(0 < weight < SMALLEST_WEIGHT for weight in weights):
+        raise refuse(
+            "a weight so small is rounding", "fixed_weights", str(list(weights)),
+            f"0, or {SMALLEST_WEIGHT:g} and more",
+        )  # fmt: skip
     if abs(total - 1) > WEIGHT_TOLERANCE:
         sound = ", ".join(f"{w / total:.12g}" for w in weights)
         raise refuse(

@@ -75,10 +75,14 @@ def check_times(architecture: Architecture) -> None:
             f"duration_s = {step * max(round(duration / step), 1):.12g}",
         )  # fmt: skip
     if duration / substep > MOST_SUBSTEPS * (1 + _STEP_TOLERANCE):
+        # A sub-step is no longer than a step: where that is too short, the run is too long.
+        longest = step * math.floor(MOST_SUBSTEPS * substep / step)
         raise refuse(
-            "too long a run for its sub-step", "duration_s",
+            "too long a run for its sub-step", "duration_s" if longest > 0 else "substep_s",
             f"{duration / substep:.6g} sub-steps, at most {MOST_SUBSTEPS}",
-            f"duration_s = {step * math.floor(MOST_SUBSTEPS * substep / step):.12g} or less",
+            f"duration_s = {longest:.12g} or less"
+            if longest > 0
+            else f"substep_s of {duration / MOST_SUBSTEPS:.3g} or more",
         )  # fmt: skip
 
 

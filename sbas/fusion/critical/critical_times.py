@@ -73,9 +73,14 @@ class CriticalTimes:
         return tuple(self.table.index[self.table["verdict"] == "critical"])
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON; what is not estimable, or not reached, is None."""
+        """Plain values for JSON; what is not estimable is None, and so is `reach_q05_s` where it
+        is never reached: `reach_q05_never` says so."""
         rows = [
-            {"combination": name, **{key: _plain(value) for key, value in row.items()}}
+            {
+                "combination": name,
+                **{key: _plain(value) for key, value in row.items()},
+                "reach_q05_never": math.isinf(row["reach_q05_s"]),
+            }
             for name, row in self.table.to_dict(orient="index").items()
         ]
         return {

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -142,7 +142,7 @@ def replayed(
             f"no stretch{within} is as long as a run",
             evidence=f"a run takes {window * grid.interval_s:g} s, the longest stretch "
             f"{longest_stretch(grid, environment) * grid.interval_s:g} s",
-            cure="shorter runs, blocks (block_bootstrapped), or a longer recording",
+            cure="shorter runs, --resampling block_bootstrap, or a longer recording",
         )
     return _source("replay", grid, step_s, offsets, window, (environment or "",), (starts,))
 
@@ -208,7 +208,16 @@ def block_bootstrapped(
                 cure="a longer recording; or join labels, or choose one with environment=",
             )
     labels = names if grid.labels else ("",)
-    return _source("block_bootstrap", grid, step_s, offsets, block, labels, pools)
+    source = _source("block_bootstrap", grid, step_s, offsets, block, labels, pools)
+    if block < needed or block == int(offsets.max()) + 1:
+        same = Finding(
+            "E28", "info", "a block is as long as a run: the blocks are windows of a replay",
+            evidence=f"blocks of {needed * grid.interval_s:g} s are needed, a run takes "
+            f"{duration_s:g} s",
+            cure="replay, which needs no tau; or longer runs",
+        )  # fmt: skip
+        source = replace(source, findings=(*source.findings, same))
+    return source
 
 
 # --- how long a block must be -----------------------------------------------------------------
@@ -232,7 +241,7 @@ def _tau_s(grid: RecordedGrid) -> float:
     raise InputError(
         "the decorrelation time of the errors is not known: no block length follows",
         evidence=reasons[0],
-        cure="tau_s= from a longer recording of the same receiver, or replayed(...)",
+        cure="--resampling replay, or a longer recording",
     )
 
 

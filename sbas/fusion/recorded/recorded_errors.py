@@ -6,7 +6,6 @@ threshold, exactly where the state of the horizontal error is U here; see `along
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
@@ -160,7 +159,7 @@ def along_track_errors(
         raise InputError(
             "a protection level of 0 m or less protects nothing", code="E13",
             evidence=f"{not_positive:,} epochs, the lowest {np.nanmin(hpl):g} m",
-            cure="map what stands for 'no level' to missing: sbas.repair",
+            cure="--pl-zero missing, or sbas.repair",
         )  # fmt: skip
     checked = check(recording, truth=truth)
     survey = checked.survey
@@ -242,11 +241,15 @@ def _check_arguments(
         raise InputError(
             "an unknown error to judge by", evidence=repr(judged_by), cure="horizontal or along"
         )
-    if azimuth_deg is not None and not math.isfinite(azimuth_deg):
-        raise InputError("the azimuth is no number", evidence=f"{azimuth_deg} deg")
+    if azimuth_deg is not None and not abs(azimuth_deg) <= 360:
+        raise InputError(
+            "an azimuth lies between -360 and 360 degrees", evidence=f"{azimuth_deg} deg",
+            cure="--azimuth 90 for a track to the east",
+        )  # fmt: skip
     if azimuth_deg is not None and (track is not None or direction_above_mps is not None):
         raise InputError(
-            "two directions of travel", cure="give an azimuth, or what tells it, not both"
+            "two directions of travel",
+            cure="give an azimuth (--azimuth), or what tells it, not both",
         )
 
 
@@ -257,8 +260,8 @@ def _azimuth_deg(errors: pd.DataFrame, given: float | None) -> Floats | float:
     if "track_azimuth_deg" not in errors:
         raise InputError(
             "nothing tells the direction of travel: an error along it has no sign",
-            cure="a track, a trajectory with heading_deg, direction_above_mps=1.0 for a "
-            "trajectory without, or azimuth_deg for an antenna that stands",
+            cure="--track; a trajectory with heading_deg, or --direction-above 1 (m/s) for a "
+            "trajectory without, or --azimuth for an antenna that stands",
         )
     azimuth: Floats = errors["track_azimuth_deg"].to_numpy(float)
     if "track_ambiguous" not in errors:

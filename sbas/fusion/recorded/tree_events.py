@@ -28,13 +28,14 @@ from sbas.dependability.tree.model import (
 )
 from sbas.dependability.tree.model_check import check_model
 from sbas.exceptions import InputError
-from sbas.fusion.logic.boolean_form import Condition, Implicant, prime_implicants
+from sbas.fusion.logic.boolean_form import Condition, Implicant, holds, prime_implicants
 from sbas.fusion.logic.truth_table import TruthTable
-from sbas.fusion.states import DA, LETTERS, NO_DATA, WORDS, N, U
+from sbas.fusion.states import DA, LETTERS, NO_DATA, WORDS, N, U, combination_codes
 
 NOTES = (
     "the truth table stands for the fusion: a simulated fusion may be unacceptable more often",
     "a sensor without data counts as U: a truth table has no fourth state",
+    "the gate of a critical combination holds in worse ones too, whatever its nominal sensors do",
 )
 """What every tree of this module supposes; it travels with it."""
 
@@ -145,6 +146,12 @@ def state_fault_tree(
     products = [
         tree.product(f"{condition} {i}", implicant) for i, implicant in enumerate(implicants, 1)
     ]
+    never = isinstance(sources, MarkovSource) and not _ever(table, condition, sources)
+    if never and not rates:
+        raise InputError(
+            f"the condition {condition!r} was never met: a probability of 0 would mean not seen",
+            cure="more runs, or failure rates of the hardware",
+        )  # fmt: skip
     tree.gates.append(Or(condition, tuple(products)))
     lasting = [
         tree.lasting(letters, seconds, step_s) for letters, seconds in (critical or {}).items()
@@ -169,7 +176,12 @@ def state_fault_tree(
         gates=tuple(tree.gates),
         top="TOP" if lasting else condition,
         cases=(condition, *lasting),
-        notes=(f"truth table: {table.provenance}", law, *NOTES),
+        notes=(
+            f"truth table: {table.provenance}",
+            law,
+            *NOTES,
+            *([f"{condition} was never met by states: what is left is hardware"] if never else []),
+        ),
     )  # fmt: skip
     check_model(model)
     return model
@@ -203,6 +215,12 @@ def _check_names(
         )
 
 
+def _ever(table: TruthTable, condition: Condition, source: MarkovSource) -> bool:
+    """Whether some joint state of the source meets the condition; no data counts as U."""
+    seen = np.array([[_level(letter) for letter in state] for state in source.states], np.int8)
+    return bool(holds(table, condition)[combination_codes(seen.T)].any())
+
+
 class _Tree:
     """Events and gates in the making; what is asked of a sensor is written once."""
 
@@ -217,6 +235,7 @@ class _Tree:
         self.events: dict[str, Event] = {}
         self.gates: list[Gate] = []
         self.used: set[str] = set()
+        self.levels: dict[tuple[int, int], str] = {}
 
     def product(self, name: str, implicant: Implicant) -> str:
         """Gate of one product of conditions on the sensors."""
@@ -249,9 +268,10 @@ class _Tree:
         # Whole steps, rounded down: the gate must not be true later than the critical time.
         whole = duration_epochs(seconds, step_s, "age") - 1
         steps = whole if whole * step_s <= seconds * (1 + 1e-9) else whole - 1
-        self.gates.append(And(letters, inputs))
-        self.gates.append(Dur(f"{letters} lasts", steps * step_s, letters, rule="age"))
-        return f"{letters} lasts"
+        together = f"{letters} or worse"
+        self.gates.append(And(together, inputs))
+        self.gates.append(Dur(f"{together} lasts", steps * step_s, together, rule="age"))
+        return f"{together} lasts"
 
     def _literals(self, k: int, lowest: int, highest: int) -> Iterable[str]:
         """Names of the gates that hold a sensor between two levels."""
@@ -261,16 +281,17 @@ class _Tree:
             yield self._not(self._at_least(k, highest + 1))
 
     def _not(self, name: str) -> str:
-        if all(gate.name != f"not {name}" for gate in self.gates):
-            self.gates.append(Not(f"not {name}", name))
-        return f"not {name}"
+        negated = f"not {name}"
+        if not any(isinstance(gate, Not) and gate.input == name for gate in self.gates):
+            self.gates.append(Not(negated, name))
+        return negated
 
     def _at_least(self, k: int, level: int) -> str:
         """Gate "hardware failed, or the state is this one or worse"."""
         sensor = self.names[k]
-        name = f"{sensor} {'U' if level == U else 'DA or U'}"
-        if any(gate.name == name for gate in self.gates):
-            return name
+        if (k, level) in self.levels:
+            return self.levels[k, level]
+        name = self.levels[k, level] = f"{sensor} {'U' if level == U else 'DA or U'}"
         inputs = []
         states = self._states(k, level)
         if states:

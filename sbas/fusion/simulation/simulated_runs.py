@@ -116,6 +116,7 @@ def simulate_runs(
         output_state=output_state,
         output_error_m=output_error_m,
         declared_usable=usable,
+        weights=fusion.weights,
     )
 
 

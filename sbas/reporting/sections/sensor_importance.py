@@ -13,6 +13,12 @@ from sbas.reporting.drawn import drawn
 def section(found: CausalAnalysis) -> Section:
     """Probabilities of both top events, bars of importance, and the truth table drawn."""
     importance = found.importance
+    if importance is None:
+        return Section(
+            "importance", "Which sensor matters",
+            paragraphs=("Not estimable: no epoch has a state of every sensor.",),
+            pictures=_tree(found),
+        )  # fmt: skip
     rows: list[tuple[Cell | str, ...]] = [
         (
             {"notN": "output not N", "isU": "output U"}[top],

@@ -122,7 +122,7 @@ def test_too_short_a_record_is_refused_in_words() -> None:
     with pytest.raises(InputError, match="no stretch is as long as a run") as caught:
         replayed(errors, step_s=1.0, duration_s=31.0)
     assert "a run takes 31 s, the longest stretch 30 s" in caught.value.evidence
-    assert "block_bootstrapped" in caught.value.cure
+    assert "block_bootstrap" in caught.value.cure
 
 
 def test_few_windows_and_lost_fixes_are_told() -> None:
@@ -232,7 +232,7 @@ def test_an_unknown_decorrelation_time_is_estimated_or_refused() -> None:
     assert 3 * tau * 0.7 < found.block_cells < 3 * tau * 1.4
     with pytest.raises(InputError, match="decorrelation time of the errors is not known") as caught:
         block_bootstrapped(record(gauss_markov(60, tau, seed=2)), step_s=1.0, duration_s=10.0)
-    assert "tau_s=" in caught.value.cure
+    assert "--resampling replay" in caught.value.cure
 
 
 # --- in the simulation ------------------------------------------------------------------------

@@ -44,7 +44,7 @@ def recording(
 
 
 def found(source: Recording, **options: Any) -> RecordedErrors:
-    given_options: dict[str, Any] = {"truth": TRUTH, "azimuth_deg": 90.0, "thresholds": LIMIT}
+    given_options: dict[str, Any] = {"truth": TRUTH, "--azimuth": 90.0, "thresholds": LIMIT}
     return along_track_errors(source, **{**given_options, **options})
 
 
@@ -145,7 +145,7 @@ def test_without_truth_or_direction_there_is_no_sign() -> None:
         assert "--truth" in caught.value.cure
     with pytest.raises(InputError, match="direction of travel") as caught:
         found(source, azimuth_deg=None)
-    assert "azimuth_deg" in caught.value.cure
+    assert "--azimuth" in caught.value.cure
     with pytest.raises(InputError, match="two directions"):
         found(source, direction_above_mps=1.0)
     with pytest.raises(InputError, match="no number"):

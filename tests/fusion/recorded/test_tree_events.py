@@ -168,14 +168,14 @@ def test_a_critical_combination_is_a_duration_gate() -> None:
         two_line_form(NAMES), sources, step_s=1.0, mission_s=11.0, critical={"UUN": 2.7}
     )
     assert model.top == "TOP"
-    assert model.cases == ("isU", "UUN lasts")
+    assert model.cases == ("isU", "UUN or worse lasts")
     #                 U U lasts from 2 to 5: true from 4 on; the third sensor may get worse
     odo = np.array([[0, 0, 2, 2, 2, 2, 0, 2, 2, 0, 2, 2]])
     acc = np.array([[0, 2, 2, 2, 2, 2, 0, 2, 2, 2, 2, 1]])
     gps = np.array([[0, 0, 0, 1, 0, 0, 0, 0, 2, 0, 0, 0]])
     truth = gate_truth(model, {"Odo": odo, "Acc": acc, "GPS": gps})
     # 2.7 s are rounded down to 2 steps: the time since the entry is 2 s at the third epoch.
-    assert np.flatnonzero(truth["UUN lasts"][0]).tolist() == [4, 5]
+    assert np.flatnonzero(truth["UUN or worse lasts"][0]).tolist() == [4, 5]
     assert np.flatnonzero(truth["isU"][0]).tolist() == [8]
     assert np.flatnonzero(truth["TOP"][0]).tolist() == [4, 5, 8]
 
@@ -187,7 +187,7 @@ def test_a_silent_sensor_of_a_critical_combination_may_also_be_unacceptable() ->
     )
     odo, gps = np.array([[1, 2, 3, 1]]), np.array([[3, 2, 3, 1]])
     truth = gate_truth(model, {"Odo": odo, "Acc": np.zeros((1, 4), int), "GPS": gps})
-    assert truth["DN- lasts"][0].tolist() == [True, True, True, False]
+    assert truth["DN- or worse lasts"][0].tolist() == [True, True, True, False]
 
 
 def test_a_critical_time_of_nothing_and_on_the_grid() -> None:
@@ -196,7 +196,7 @@ def test_a_critical_time_of_nothing_and_on_the_grid() -> None:
         model = state_fault_tree(
             two_line_form(NAMES), sources, step_s=0.1, mission_s=1.0, critical={"NDU": seconds}
         )
-        (gate,) = [g for g in model.gates if g.name == "NDU lasts"]
+        (gate,) = [g for g in model.gates if g.name == "NDU or worse lasts"]
         assert gate.seconds == pytest.approx(0.1 * epochs)  # type: ignore[union-attr]
     # The gate "DA or worse" of the second sensor, U of the third, for 2 s: (d + u)^3 u^3 where
     # every epoch is drawn anew.
@@ -205,7 +205,7 @@ def test_a_critical_time_of_nothing_and_on_the_grid() -> None:
         {name: chain(name, 0.2, 0.1) for name in ("A", "B")},
         step_s=1.0, mission_s=10.0, critical={"DU": 2.0},
     )  # fmt: skip
-    row = depend(model).solutions[model.name].rows["DU lasts"]
+    row = depend(model).solutions[model.name].rows["DU or worse lasts"]
     assert row.at_end == pytest.approx(0.3**3 * 0.1**3)
 
 
@@ -219,7 +219,7 @@ def test_the_model_is_read_again_and_printed(tmp_path: Path) -> None:
         dump_model(model, tmp_path / name)
         assert load_model(tmp_path / name) == model
     text = model_text(model)
-    assert "NNU lasts: DUR, 3 s by 'age'" in text
+    assert "NNU or worse lasts: DUR, 3 s by 'age'" in text
     assert "geometric" in text
     assert "truth table stands for the fusion" in text
 
