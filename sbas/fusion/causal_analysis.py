@@ -28,7 +28,7 @@ from sbas.fusion.recorded.state_sources import combination_source
 from sbas.fusion.recorded.tree_events import failed_or, hardware_probability, state_fault_tree
 from sbas.fusion.simulation.simulated_runs import simulate_runs
 from sbas.fusion.states import NO_DATA, StateShares, shares
-from sbas.numerals import upward
+from sbas.numerals import number, upward
 from sbas.recording import Recording
 from sbas.track import Track
 from sbas.truth import Truth
@@ -181,9 +181,18 @@ class CausalAnalysis:
             f"{self.architecture.duration_s:g} s, step {self.runs.step_s:g} s, seed {self.seed}; "
             "modelled",
             *self._recorded_line(),
-            f"  output N {out.nominal / out.epochs:.4f}, DA {out.degraded / out.epochs:.4f}, "
-            f"U {out.unacceptable / out.epochs:.4f}, no data {out.no_data / out.epochs:.4f}",
-            f"  available {out.available:.4f}, safe {out.safe:.4f}, hazard {out.hazard:.4f}",
+            "  output "
+            + ", ".join(
+                f"{word} {number(epochs / out.epochs, 4)}"
+                for word, epochs in (
+                    ("N", out.nominal),
+                    ("DA", out.degraded),
+                    ("U", out.unacceptable),
+                    ("no data", out.no_data),
+                )
+            ),
+            f"  available {number(out.available, 4)}, safe {number(out.safe, 4)}, "
+            f"hazard {number(out.hazard, 4)}",
             *self._hardware_line(),
             f"  combinations of {', '.join(found.names)} (N, D for DA, U, - for no data): "
             f"{sum('-' not in name for name in found.table.index)} of {3 ** len(found.names)} met, "
@@ -213,8 +222,9 @@ class CausalAnalysis:
         files = ", ".join(str(source.get("path", "")) for source in self.recorded.sources)
         yield (
             f"  receiver: errors along the track of {files or 'a recording'}, "
-            f"{self.resampled.kind.replace('_', ' ')}; U {self.resampled.recorded_u_share:.4f} "
-            f"recorded, {self.resampled.drawn_u_share:.4f} drawn"
+            f"{self.resampled.kind.replace('_', ' ')}; "
+            f"U {number(self.resampled.recorded_u_share, 4)} recorded, "
+            f"{number(self.resampled.drawn_u_share, 4)} drawn"
         )
         counts = self.recorded.counts
         yield (

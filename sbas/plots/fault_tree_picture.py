@@ -179,7 +179,7 @@ def _event_words(event: Event) -> str:
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= 13 else text[:12] + "…"
+    return text if len(text) <= 16 else text[:15] + "…"
 
 
 def _legend(layout: Layout, measure: Measure | None) -> str:
