@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,7 @@ from sbas.cli import inputs, output
 from sbas.cli.option_groups import with_option_groups
 from sbas.estimate import Estimate, Refusal
 from sbas.exceptions import InputError
+from sbas.input_check import accept as accepted
 from sbas.integrity.causes.causes import Causes, explain
 from sbas.integrity.epoch_levels import whole_table
 from sbas.integrity.evaluation import evaluate
@@ -96,10 +98,14 @@ def evaluate_files(
 
         causes = likely_causes(opened.source, result, truth=opened.truth, accept=accept or ())
         source = opened.source
-        if result.epochs <= MOST_EXPLAINED and any(file.suffix == ".parquet" for file in files):
+        if result.epochs <= MOST_EXPLAINED and _has_companions(source):
             # Only a recording read whole has the table of the satellites that RAIM needs.
             again = inputs.open_recording(files, truth, reading, repairing, quiet=True, whole=True)
             source = again.source
+            # What is wrong with its companion files shows only now.
+            more = [f for f in source.meta.findings if f not in opened.source.meta.findings]
+            more = [f for f in accepted(more, accept or ()) if f not in result.findings]
+            result = replace(result, findings=(*result.findings, *more))
         page = write_report(result, report, causes=causes, raim=range_monitoring(source, result))
     if json:
         output.print_json({**result.to_dict(), "report": None if page is None else str(page)})
@@ -122,6 +128,15 @@ def likely_causes(
         return explain(source, truth=truth, accept_findings=accept)
     except InputError as error:
         return Refusal(error.what, error.cure)
+
+
+def _has_companions(source: EpochSource) -> bool:
+    """True where a source streams from a format whose side tables lie in files of their own."""
+    from sbas.logs.arrow.parquet import FORMAT
+
+    return not isinstance(source, Recording) and any(
+        file.format == FORMAT.name for file in source.meta.sources
+    )
 
 
 def range_monitoring(source: EpochSource, result: Evaluation) -> LevelComparison | Refusal | None:

@@ -2,16 +2,39 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from sbas.cli import output
+from sbas.cli import inputs, output
 from sbas.cli.inputs import refuse_to_overwrite
+from sbas.cli.monitored import (
+    CORRECTED_WORDS,
+    RangeFiles,
+    check_mask,
+    corrected_by_sbas,
+    has_fixes,
+    no_fix,
+    place_of,
+    refuse_alone,
+    sigma_of,
+    whole_recording,
+)
+from sbas.cli.option_groups import with_option_groups
 from sbas.cli.writing import write_recording
+from sbas.estimate import Refusal
 from sbas.exceptions import InputError
+from sbas.logs.arrow.parquet import FORMAT as PARQUET
+from sbas.recording import Recording
+
+if TYPE_CHECKING:
+    from sbas.monitoring.araim_result import AraimResult
+    from sbas.monitoring.level_comparison import LevelComparison
+
+MASK_DEG = 5.0
+"""Elevation mask of positions from ranges."""
 
 Observations = Annotated[
     list[Path],
@@ -52,7 +75,7 @@ def protect_files(
     ] = None,
     k_h: Annotated[float | None, typer.Option("--k-h", help="K of the HPL, else 6.0/6.18.")] = None,
     k_v: Annotated[float | None, typer.Option("--k-v", help="K of the VPL, else 5.33.")] = None,
-    elevation: Annotated[float, typer.Option(help="Elevation mask in degrees.")] = 5.0,
+    elevation: Annotated[float, typer.Option(help="Elevation mask in degrees.")] = MASK_DEG,
     smoothing: Annotated[
         bool, typer.Option("--smoothing", help="Smooth the code by the carrier over 100 s.")
     ] = False,
@@ -93,6 +116,7 @@ def protect_files(
     from sbas.positioning.receiver_noise import CLASS_1, CLASS_2
 
     refuse_to_overwrite(out, [*obs, *nav, *messages])
+    check_mask(elevation)
     with output.progress("positioning", quiet) as callback:
         if callback is not None:
             callback(0, 1)
@@ -103,7 +127,7 @@ def protect_files(
             geo=geo,
             mode=mode,
             profile=profile,
-            place_m=_place(position),
+            place_m=place_of(position),
             k_h=k_h,
             k_v=K_V if k_v is None else k_v,
             elevation_mask_deg=elevation,
@@ -144,105 +168,191 @@ def protect_files(
         raise typer.Exit(2)
 
 
+@with_option_groups
 def raim_files(
-    obs: Observations,
-    nav: NavigationFiles,
+    reading: inputs.Reading,
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="A recording with ranges (sbas protect) or with a receiver's own RAIM (SBF with "
+            "RAIMStatistics), in any format of docs/formats.md; or else --obs and --nav.",
+            metavar="FILE...",
+        ),
+    ] = None,
+    obs: Annotated[
+        list[Path] | None,
+        typer.Option("--obs", help="RINEX observations, also compressed; may be repeated."),
+    ] = None,
+    nav: Annotated[
+        list[Path] | None, typer.Option("--nav", help="RINEX navigation; may be repeated.")
+    ] = None,
     messages: Annotated[
         list[Path] | None,
         typer.Option(help="SBAS messages; without them ranges are not corrected."),
     ] = None,
     geo: Annotated[int | None, typer.Option(help="PRN of the SBAS satellite.")] = None,
     mode: Annotated[
-        Literal["pa", "npa"], typer.Option(help="With messages: which approach.")
-    ] = "npa",
+        Literal["pa", "npa"] | None, typer.Option(help="With messages: which approach, else npa.")
+    ] = None,
     position: Annotated[
         str | None,
         typer.Option(metavar="X,Y,Z", help="Known antenna position, earth-fixed, in metres."),
     ] = None,
-    false_alarm: Annotated[float, typer.Option(help="Of the overall test, per epoch.")] = 1e-3,
-    missed_detection: Annotated[float, typer.Option(help="Of a fault of the stated size.")] = 1e-4,
-    elevation: Annotated[float, typer.Option(help="Elevation mask in degrees.")] = 5.0,
+    false_alarm: Annotated[
+        float | None, typer.Option(help="Of the overall test, per epoch, else 1e-3.")
+    ] = None,
+    missed_detection: Annotated[
+        float | None, typer.Option(help="Of a fault of the stated size, else 1e-4.")
+    ] = None,
+    sigma: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A or A,B",
+            help="1-sigma of ranges in metres instead of their own: A, or the root of "
+            "A^2 + (B / sin elevation)^2.",
+        ),
+    ] = None,
+    elevation: Annotated[
+        float | None,
+        typer.Option(help="Elevation mask in degrees; with --obs 5 where none is given."),
+    ] = None,
     track_azimuth: Annotated[
         float | None, typer.Option(help="Azimuth of a track: levels along and across it.")
+    ] = None,
+    alert_limit: Annotated[
+        float | None,
+        typer.Option(help="Of the levels beside the HPL: available below so many metres."),
     ] = None,
     araim: Annotated[
         bool, typer.Option("--araim", help="Levels of ARAIM too, with the priors below.")
     ] = False,
     prior_satellite: Annotated[
-        float, typer.Option(help="ARAIM: prior of a fault of one satellite.")
-    ] = 1e-5,
+        float | None, typer.Option(help="ARAIM: prior of a fault of one satellite, else 1e-5.")
+    ] = None,
     prior_constellation: Annotated[
-        float, typer.Option(help="ARAIM: prior of a fault of a whole constellation.")
-    ] = 1e-4,
+        float | None,
+        typer.Option(help="ARAIM: prior of a fault of a whole constellation, else 1e-4."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the recording with its RAIM flags: .parquet.")
     ] = None,
+    accept: inputs.Accept = None,
     json: output.Json = False,
     quiet: output.Quiet = False,
 ) -> None:
     """What does RAIM say on the same epochs: available, detected, excluded, HERL?
 
     Example:  sbas raim --obs a.obs --nav a.nav --messages a.ems --geo 123
-    """
-    from sbas.monitoring import (  # loaded only where it is used
-        AraimSettings,
-        araim_of_recording,
-        raim,
-        with_raim_flags,
-    )
-    from sbas.positioning import protect, unaugmented
 
-    inputs = [*obs, *nav, *(messages or ())]
+    Of a recording:  sbas raim roof.sbf --alert-limit 25
+    """
+    # Loaded only where it is used.
+    from sbas.monitoring import raim, with_raim_flags
+    from sbas.monitoring.recording_monitor import takes_ranges
+
+    ranges = RangeFiles(obs, nav, messages, geo, mode, position)
+    check_mask(elevation)
+    refuse_alone(araim, "--araim", prior_satellite=prior_satellite,
+                  prior_constellation=prior_constellation)  # fmt: skip
     if out is not None:
-        refuse_to_overwrite(out, inputs)
-    with output.progress("positioning", quiet) as callback:
-        if callback is not None:
-            callback(0, 1)
-        place = _place(position)
-        if messages:
-            if geo is None:
-                raise InputError("--messages need the SBAS satellite", cure="--geo PRN")
-            recording = protect(
-                obs, nav, messages, geo=geo, mode=mode, place_m=place, elevation_mask_deg=elevation
+        refuse_to_overwrite(out, [*(files or ()), *(obs or ()), *(nav or ()), *(messages or ())])
+        if out.suffix.lower() not in PARQUET.extensions:
+            raise InputError(
+                f"--out {out.name} would lose who made the flags and levels",
+                cure="name a .parquet file: only it keeps metadata",
             )
-        else:
-            recording = unaugmented(obs, nav, place_m=place, elevation_mask_deg=elevation)
-        result = raim(
-            recording,
-            false_alarm=false_alarm,
-            missed_detection=missed_detection,
-            track_azimuth_deg=track_azimuth,
+    settings: dict[str, Any] = {
+        name: value
+        for name, value in (
+            ("false_alarm", false_alarm),
+            ("missed_detection", missed_detection),
+            ("sigma", None if sigma is None else sigma_of(sigma)),
+            ("elevation_mask_deg", elevation if files else None),
         )
-        advanced = None
-        if araim:
-            settings = AraimSettings(
-                p_satellite=prior_satellite, p_constellation=prior_constellation
+        if value is not None
+    }
+    if files:
+        ranges.refuse()
+        recording = whole_recording(files, reading, accept, settings, quiet)
+        if settings and not takes_ranges(recording, settings.get("sigma")):
+            raise InputError(
+                "settings of levels from ranges change nothing: the recording has its own RAIM",
+                where=", ".join(settings),
+                cure="leave them out, or give a recording with ranges: sbas protect",
             )
-            advanced = araim_of_recording(recording, settings=settings, heading_deg=track_azimuth)
+    else:
+        if accept or reading != inputs.Reading():
+            raise InputError("--accept and options of reading are for a recording FILE")
+        with output.progress("positioning", quiet) as callback:
+            if callback is not None:
+                callback(0, 1)
+            recording = ranges.recording(MASK_DEG if elevation is None else elevation)
+    result = raim(recording, track_azimuth_deg=track_azimuth, **settings)
+    findings = list(dict.fromkeys([*recording.meta.findings, *result.findings]))
+    none = result.source == "ranges" and not has_fixes(recording)
+    if none and not any(f.code == "E15" for f in findings):
+        findings.append(no_fix(recording))
+    answer: dict[str, Any] = {
+        **result.to_dict(),
+        "ranges_corrected_by_sbas": corrected_by_sbas(recording),
+        "findings": [finding.to_dict() for finding in findings],
+        "file": None if out is None else str(out),
+    }
+    compared = _against_sbas(recording, settings, alert_limit)
+    if compared is not None:
+        answer["against_sbas"] = compared.to_dict()
+    advanced = None
+    if araim:
+        advanced = _araim(recording, settings, track_azimuth, prior_satellite, prior_constellation)
+        answer["araim"] = advanced.to_dict()
     if out is not None:
         write_recording(out, [with_raim_flags(recording, result)])
     if json:
-        answer = {**result.to_dict(), "file": None if out is None else str(out)}
-        if advanced is not None:
-            answer["araim"] = advanced.to_dict()
         output.print_json(answer)
     else:
-        print(result)
+        print(replace(result, findings=()))
+        print(CORRECTED_WORDS[corrected_by_sbas(recording)])
+        if compared is not None:
+            words = compared if isinstance(compared, Refusal) else compared.statement()
+            print(f"\n{words}")
         if advanced is not None:
-            print(advanced)
+            print(f"\n{advanced}")
+        output.print_findings(findings)
+        if out is not None:
+            print(f"\nrecording  {out}")
+    if none:
+        raise typer.Exit(2)
 
 
-def _place(text: str | None) -> tuple[float, float, float] | None:
-    if text is None:
+def _against_sbas(
+    recording: Recording, settings: dict[str, Any], alert_limit: float | None
+) -> LevelComparison | Refusal | None:
+    """RAIM beside the HPL where there is one; an alert limit insists on it."""
+    from sbas.monitoring import raim_against_sbas
+
+    levels = recording.table.get("hpl_m")
+    if alert_limit is None and (levels is None or levels.isna().all()):
         return None
     try:
-        x, y, z = (float(word) for word in text.split(","))
-    except ValueError:
-        x = y = z = math.nan
-    if not 6.3e6 < math.hypot(x, y, z) < 6.5e6:
-        raise InputError(
-            "--position is no place on Earth",
-            evidence=repr(text),
-            cure="--position X,Y,Z, earth-fixed, in metres",
-        )
-    return x, y, z
+        return raim_against_sbas(recording, alert_limit_m=alert_limit, **settings)
+    except InputError as error:
+        if alert_limit is not None:
+            raise
+        return Refusal(error.what, error.cure)
+
+
+def _araim(
+    recording: Recording,
+    settings: dict[str, Any],
+    heading_deg: float | None,
+    satellite: float | None,
+    constellation: float | None,
+) -> AraimResult:
+    from sbas.monitoring import AraimSettings, araim_of_recording
+
+    priors = {"p_satellite": satellite, "p_constellation": constellation}
+    given: dict[str, Any] = {name: p for name, p in priors.items() if p is not None}
+    own = {name: settings[name] for name in ("sigma", "elevation_mask_deg") if name in settings}
+    return araim_of_recording(
+        recording, settings=AraimSettings(**given), heading_deg=heading_deg, **own
+    )

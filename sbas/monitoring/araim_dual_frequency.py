@@ -9,7 +9,9 @@ these figures are the geometry's share and not a claim.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -50,9 +52,9 @@ class SupportMessage:
     def __post_init__(self) -> None:
         for name, least in (("ura_m", 0.0), ("ure_m", 0.0), ("b_nom_m", 0.0)):
             given = getattr(self, name)
-            values = [given] if isinstance(given, (int, float)) else list(given.values())
+            values = list(given.values()) if isinstance(given, Mapping) else [given]
             for value in values:
-                if not least <= value < np.inf:
+                if not isinstance(value, Real) or not least <= float(value) < np.inf:
                     raise InputError(
                         f"{name} must be a length from 0", where=name, evidence=f"{value!r}"
                     )
@@ -123,13 +125,16 @@ def dual_frequency_ranges(
     letters, clock, known = bare.clocks()
     elevation = np.asarray(bare.elevation_deg)
     local = np.full(elevation.shape, np.nan)
-    for number, letter in enumerate(letters):
+    # SBAS satellites share the clock of GPS and not its errors.
+    present = "S" if (np.asarray(bare.constellation) == "S").any() else ""
+    for letter in (*letters, *present):
         if letter not in _USER_SIGMA:
             raise InputError(
                 f"no model of user errors for constellation {letter}",
                 where="constellation",
                 cure="AraimGeometry(..., sigma_int_m=, sigma_acc_m=) with sigmas of your own",
             )
+    for number, letter in enumerate(letters):
         own = known & (clock == number)
         local[own] = _USER_SIGMA[letter](elevation[own])
     variance = local**2 + tropospheric_sigma_m(elevation) ** 2

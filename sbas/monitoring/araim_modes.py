@@ -26,6 +26,7 @@ from sbas.monitoring.normal_equations import (
     NEGLIGIBLE_INFLUENCE,
     Floats,
     Ints,
+    RangeReason,
     Ranges,
     geometry,
     ranges,
@@ -82,10 +83,12 @@ class Fixes:
 
 def fixes(slots: Slots) -> Fixes:
     """Ranges that take part, in front; the rest is cut off where no epoch needs it."""
+    bounded = np.isfinite(slots.bias_m)
     given = ranges(
         slots.elevation_deg, slots.azimuth_deg, slots.sigma_m,
-        clock=slots.clock, used=slots.used, residual_m=slots.residual_m,
+        clock=slots.clock, used=slots.used & bounded, residual_m=slots.residual_m,
     )  # fmt: skip
+    given.reason[slots.used & ~bounded] = RangeReason.NO_BIAS
     serves = given.reason == 0
     most = max(int(serves.sum(axis=0).max(initial=0)), 1)
     slot = np.argsort(~serves, axis=0, kind="stable")[:most]
@@ -202,18 +205,23 @@ def vertical_threshold(modes: FaultModes, p_emt: float) -> Floats:
     return np.where(np.isfinite(largest), largest, np.nan)
 
 
-def alarm_ratio(modes: FaultModes) -> Floats:
-    """(n,) largest solution separation over its threshold, on any axis east, north, up: above 1
-    a fault is detected. NaN without residuals or where nothing is monitored."""
+def alarm_ratio(modes: FaultModes, axis_known: Bools) -> Floats:
+    """(n,) largest solution separation over its threshold: from 1 a fault is detected.
+
+    Every axis is tested, those of a track as well: the level of each contains the threshold of
+    its own test. NaN without residuals, or where nothing is monitored.
+
+    Parameters
+    ----------
+    axis_known : (q, n) False where an axis has no direction, and so no test.
+    """
     separation = modes.subsets.separation_m
     if separation is None:
         return np.full(modes.solved.shape, np.nan)
-    axes = slice(0, len(ENU))
     # A satellite that does not move an axis has nothing but rounding to test there.
-    moves = modes.subsets.sigma_separation_m[axes] > (
-        NEGLIGIBLE_INFLUENCE * modes.sigma_m[axes, None]
-    )
-    tested = moves & modes.monitored
-    threshold = np.where(tested, modes.threshold_m[axes], 1.0)
-    ratio = np.where(tested, np.abs(separation[axes]) / threshold, -np.inf).max(axis=(0, 1))
-    return np.where(modes.solved & np.isfinite(ratio), ratio, np.nan)
+    moves = modes.subsets.sigma_separation_m > NEGLIGIBLE_INFLUENCE * modes.sigma_m[:, None]
+    tested = moves & modes.monitored & axis_known[:, None]
+    threshold = np.where(tested, modes.threshold_m, 1.0)
+    with np.errstate(over="ignore"):
+        ratio = np.where(tested, np.abs(separation) / threshold, -np.inf).max(axis=(0, 1))
+    return np.where(modes.solved & (ratio > -np.inf), ratio, np.nan)

@@ -7,8 +7,8 @@ reflections and interference near a train are no events of this algorithm.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Integral
 from types import MappingProxyType
 from typing import Any
 
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sbas.exceptions import InputError
 from sbas.monitoring.araim_faults import fault_sets, most_faults, number_of_sets
-from sbas.monitoring.araim_geometry import AraimGeometry
+from sbas.monitoring.araim_geometry import AraimGeometry, numbers_of
 from sbas.monitoring.araim_modes import (
     ENU,
     TRACK,
@@ -31,146 +31,17 @@ from sbas.monitoring.araim_modes import (
     fixes,
     vertical_threshold,
 )
+from sbas.monitoring.araim_result import UNMONITORED, AraimResult
 from sbas.monitoring.araim_roots import level_of_risk
 from sbas.monitoring.araim_settings import AraimSettings, by_constellation
-from sbas.monitoring.normal_equations import GeometryReason, RangeReason
-from sbas.monitoring.raim_result import spread_of
+from sbas.monitoring.normal_equations import RangeReason
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.integer[Any]]
 Bools = NDArray[np.bool_]
 
-UNMONITORED = 100
-"""Reason code beside those of GeometryReason: what is unmonitored exhausts the budget."""
-_UNMONITORED_WORDS = "faults that cannot be monitored exhaust the integrity budget"
 _ELEMENTS = 1 << 19
 """Of the largest array at a time: enough to keep numpy busy, a few megabytes each."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class AraimResult:
-    """Levels of n epochs on q axes; infinite where there is none.
-
-    Parameters
-    ----------
-    axes : names of the axes: east, north, up, and along, across where a heading was given.
-    level_m : (n, q) protection level of each axis.
-    sigma_acc_m : (n, q) 1-sigma accuracy of the fix; NaN where there is none.
-    k_alarm : (n, q) factor K_fa of the test thresholds; NaN where nothing is monitored.
-    emt_m : (n,) effective monitor threshold; NaN where no mode is as probable as P_EMT.
-    alarm_ratio : (n,) largest solution separation over its threshold: above 1 a fault is
-        detected, and the levels mean nothing. NaN without residuals.
-    p_not_monitored : (n,) probability of the faults that are not monitored; NaN without a fix.
-    satellites : (n,) ranges in the fix.
-    faults : (n,) most faults at a time that are looked at, N_fault,max.
-    modes, modes_not_monitored : (n,) fault modes that are monitored, and that cannot be.
-    reason : (n,) 0, a GeometryReason, or `UNMONITORED`: why there is no level.
-    ranges_left_out : number of ranges that took no part, by reason.
-    settings : what the figures rest on.
-    """
-
-    axes: Axes
-    level_m: Floats
-    sigma_acc_m: Floats
-    k_alarm: Floats
-    emt_m: Floats
-    alarm_ratio: Floats
-    p_not_monitored: Floats
-    satellites: Ints
-    faults: Ints
-    modes: Ints
-    modes_not_monitored: Ints
-    reason: Ints
-    ranges_left_out: Mapping[str, int]
-    settings: AraimSettings
-
-    def on(self, axis: str) -> Floats:
-        """(n,) level of an axis [m]."""
-        return self.level_m[:, _at(self.axes, axis)]
-
-    @property
-    def hpl_m(self) -> Floats:
-        """(n,) horizontal level: root of the summed squares of the levels east and north."""
-        return np.hypot(self.level_m[:, 0], self.level_m[:, 1])
-
-    @property
-    def vpl_m(self) -> Floats:
-        """(n,) vertical level."""
-        return self.level_m[:, 2]
-
-    @property
-    def sigma_v_acc_m(self) -> Floats:
-        """(n,) 1-sigma vertical accuracy."""
-        return self.sigma_acc_m[:, 2]
-
-    @property
-    def available(self) -> Bools:
-        """(n,) there is a horizontal level, and no separation test says that it means nothing."""
-        return np.isfinite(self.hpl_m) & ~self.detected
-
-    @property
-    def detected(self) -> Bools:
-        """(n,) a solution separation reached its threshold; False without residuals."""
-        return self.alarm_ratio >= 1
-
-    @property
-    def reasons(self) -> list[str]:
-        """Why an epoch has no level, in words; "" where it has one."""
-        return [reason_words(code) for code in self.reason.tolist()]
-
-    def summary(self) -> pd.DataFrame:
-        """A row for each epoch."""
-        columns: dict[str, Any] = {"hpl_m": self.hpl_m, "vpl_m": self.vpl_m}
-        columns |= {f"pl_{axis}_m": self.on(axis) for axis in self.axes[3:]}
-        for name in ("emt_m", "sigma_v_acc_m", "alarm_ratio", "p_not_monitored", "satellites",
-                     "faults", "modes", "modes_not_monitored"):  # fmt: skip
-            columns[name] = getattr(self, name)
-        return pd.DataFrame(columns | {"reason": self.reasons})
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON: levels over available epochs, and why the others have none."""
-        levels = {"hpl_m": self.hpl_m, "vpl_m": self.vpl_m}
-        levels |= {f"pl_{axis}_m": self.on(axis) for axis in self.axes[3:]}
-        codes, counts = np.unique(self.reason[self.reason > 0], return_counts=True)
-        settings = {
-            name: dict(value) if isinstance(value, Mapping) else value
-            for name, value in vars(self.settings).items()
-        }
-        return {
-            "epochs": int(self.reason.size),
-            "available": int(self.available.sum()),
-            "detected": int(self.detected.sum()),
-            **{name: spread_of(values[self.available]) for name, values in levels.items()},
-            "emt_m": spread_of(self.emt_m[self.available]),
-            "reasons": {
-                reason_words(int(code)): int(n) for code, n in zip(codes, counts, strict=True)
-            },
-            "ranges_left_out": dict(self.ranges_left_out),
-            "settings": settings,
-        }
-
-    def __repr__(self) -> str:
-        plain = self.to_dict()
-        lines = [
-            f"ARAIM of {plain['epochs']:,} epochs: {plain['available']:,} available, "
-            f"{plain['detected']:,} with a fault detected",
-            f"  priors: satellite {self.settings.p_satellite}, constellation "
-            f"{self.settings.p_constellation}; budgets {self.settings.phmi_v:g} up, "
-            f"{self.settings.phmi_h:g} horizontally",
-        ]
-        for name, spread in plain.items():
-            if name.endswith("_m") and spread["median"] is not None:
-                lines.append(f"  {name:24s}median {spread['median']:.4g}, 95 % {spread['p95']:.4g}")
-        lines += [f"  no level: {words}: {n:,}" for words, n in plain["reasons"].items()]
-        lines += [f"  ranges left out: {w}: {n:,}" for w, n in self.ranges_left_out.items()]
-        return "\n".join(lines)
-
-
-def reason_words(code: int) -> str:
-    """Words of a reason code of `AraimResult`."""
-    if code == UNMONITORED:
-        return _UNMONITORED_WORDS
-    return "" if code == GeometryReason.SOUND else GeometryReason(code).words
 
 
 def araim_levels(
@@ -188,14 +59,15 @@ def araim_levels(
     heading_deg : (n,), or one for all: direction of the track from north by east [deg], for
         levels along and across it with one-dimensional probabilities; NaN where unknown, which
         makes these two levels NaN.
-    residual_m : (n, m) observed less computed ranges [m], for the solution separation test; a
-        range without takes no part.
+    residual_m : (n, m) observed less computed ranges [m], for the solution separation test on
+        every axis; a range without takes no part. None gives the levels of the geometry alone:
+        nothing is then tested, and no epoch is `available`.
     settings : priors and budgets; None: those of LPV-200.
 
     Returns
     -------
-    AraimResult: levels [m], and why an epoch has none. Each exceeds the root of its equation by
-        at most `araim_roots.TOLERANCE_M` and is never below it.
+    AraimResult: levels [m], whether they were tested, and why an epoch has none. Each exceeds
+        the root of its equation by at most `araim_roots.TOLERANCE_M` and is never below it.
 
     Raises
     ------
@@ -225,12 +97,12 @@ def araim_levels(
                 words = RangeReason(int(code)).words
                 left_out[words] = left_out.get(words, 0) + int(count)
         modes = problem.modes(fix, part)
-        collected.append(_levels(modes, problem.names, settings))
+        collected.append(_levels(modes, problem.names, problem.axis_known[:, part], settings))
     if not collected:
         return _nothing(problem.names, settings)
     joined = [np.concatenate(parts) for parts in zip(*collected, strict=True)]
     level, sigma, k_alarm, emt, ratio, p_nm, satellites, faults, monitored, lost, reason = joined
-    level[~problem.heading_known, len(ENU) :] = np.nan
+    level[~problem.axis_known.T] = np.nan
     return AraimResult(
         problem.names, level, sigma, k_alarm, emt, ratio, p_nm, satellites, faults, monitored,
         lost, reason, MappingProxyType(left_out), settings,
@@ -258,10 +130,20 @@ def araim_modes(
         `constellations` that fail, `prior`, `monitored`, and for each axis `sigma_..._m`,
         `bias_..._m`, `sigma_separation_..._m`, `threshold_..._m` (NaN where not monitored) and,
         with residuals, `separation_..._m`.
+
+    Raises
+    ------
+    InputError : no such epoch, or as `araim_levels`.
     """
     settings = settings or AraimSettings()
     problem = _problem(geometry, heading_deg, residual_m, settings)
-    epoch = range(geometry.shape[0])[epoch]
+    n = geometry.shape[0]
+    if isinstance(epoch, bool) or not isinstance(epoch, Integral) or not -n <= epoch < n:
+        raise InputError(
+            f"no epoch {epoch!r}", where="epoch", evidence=f"{n} epochs",
+            cure="a whole number from 0, or from -1 downward counted from the end",
+        )  # fmt: skip
+    epoch = int(epoch) % n
     part = slice(epoch, epoch + 1)
     fix = fixes(problem.slots.epochs(part))
     modes = problem.modes(fix, part)
@@ -299,7 +181,7 @@ class _Problem:
 
     names: Axes
     axes: Floats
-    heading_known: Bools
+    axis_known: Bools
     slots: Slots
     letters: tuple[str, ...]
     p_satellite: Floats
@@ -335,12 +217,14 @@ def _problem(
     n, m = geometry.shape
     letters, clock, known = geometry.clocks()
     accuracy, bias = np.asarray(geometry.sigma_acc_m), np.asarray(geometry.b_nom_m)
-    sound = (accuracy > 0) & np.isfinite(accuracy) & np.isfinite(bias)
+    with np.errstate(over="ignore"):
+        accuracy_m2 = accuracy * accuracy
+    sound = (accuracy > 0) & np.isfinite(accuracy_m2)
     slots = Slots(
         elevation_deg=np.asarray(geometry.elevation_deg).T,
         azimuth_deg=np.asarray(geometry.azimuth_deg).T,
         sigma_m=np.where(sound, geometry.sigma_int_m, np.nan).T,
-        accuracy_m2=(accuracy**2).T,
+        accuracy_m2=accuracy_m2.T,
         bias_m=bias.T,
         clock=clock.T,
         used=(np.asarray(geometry.used) & known).T,
@@ -349,18 +233,18 @@ def _problem(
     names: Axes = ENU if heading_deg is None else ENU + TRACK
     axes = np.zeros((len(names), 3, n))
     axes[[0, 1, 2], [0, 1, 2]] = 1.0
-    known_heading = np.ones(n, np.bool_)
+    axis_known = np.ones((len(names), n), np.bool_)
     if heading_deg is not None:
         given = _shaped("heading_deg", heading_deg, (n,))
-        known_heading = np.isfinite(given)
-        heading = np.deg2rad(np.where(known_heading, given, 0.0))
+        axis_known[len(ENU) :] = np.isfinite(given)
+        heading = np.deg2rad(np.where(np.isfinite(given), given, 0.0))
         axes[3, 0], axes[3, 1] = np.sin(heading), np.cos(heading)
         axes[4, 0], axes[4, 1] = np.cos(heading), -np.sin(heading)
     # Without any satellite there is one constellation all the same: nobody's.
     named = letters or ("",)
     priors = AraimSettings(p_satellite=0.0, p_constellation=0.0) if not letters else settings
     return _Problem(
-        names, axes, known_heading, slots, letters,
+        names, axes, axis_known, slots, letters,
         by_constellation("p_satellite", priors.p_satellite, named),
         by_constellation("p_constellation", priors.p_constellation, named),
         settings,
@@ -368,7 +252,7 @@ def _problem(
 
 
 def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    array = np.asarray(value, dtype=np.float64)
+    array = numbers_of(name, value)
     try:
         return np.broadcast_to(array, shape)
     except ValueError:
@@ -379,7 +263,9 @@ def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
         ) from None
 
 
-def _levels(modes: FaultModes, names: Axes, settings: AraimSettings) -> tuple[NDArray[Any], ...]:
+def _levels(
+    modes: FaultModes, names: Axes, axis_known: Bools, settings: AraimSettings
+) -> tuple[NDArray[Any], ...]:
     """Columns of an AraimResult for some epochs, epochs first."""
     q, n = modes.sigma_m.shape
     solved = modes.solved
@@ -410,7 +296,7 @@ def _levels(modes: FaultModes, names: Axes, settings: AraimSettings) -> tuple[ND
         np.where(solved, modes.sigma_acc_m, np.nan).T,
         np.where(solved, modes.k_alarm, np.nan).T,
         np.where(solved, vertical_threshold(modes, settings.p_emt), np.nan),
-        alarm_ratio(modes),
+        alarm_ratio(modes, axis_known),
         np.where(solved, modes.p_not_monitored, np.nan),
         modes.satellites,
         modes.faults,
@@ -427,14 +313,3 @@ def _nothing(names: Axes, settings: AraimSettings) -> AraimResult:
         names, wide, wide, wide, plain, plain, plain, whole, whole, whole, whole, whole,
         MappingProxyType({}), settings,
     )  # fmt: skip
-
-
-def _at(axes: Axes, axis: str) -> int:
-    if axis not in axes:
-        raise InputError(
-            f"no level {axis!r}",
-            where="axis",
-            evidence=f"there are {', '.join(axes)}",
-            cure="araim_levels(..., heading_deg=...)" if axis in TRACK else "",
-        )
-    return axes.index(axis)

@@ -20,6 +20,8 @@ _GUARD = 1e-9
 _TIE = 1e-13
 """A risk this close to its budget [share of it] may exceed it but for rounding: it does not fit."""
 _MOST_STEPS = 400
+LARGEST_M = 1e12
+"""A level beyond it, which no number resolves to a millimetre, counts as infinite."""
 
 
 def risk_of_level(
@@ -50,6 +52,8 @@ def level_of_risk(
 ) -> Floats:  # fmt: skip
     """(r,) least level whose risk does not exceed its budget, rounded up by `TOLERANCE_M`.
 
+    Infinite where it would exceed `LARGEST_M`.
+
     Parameters
     ----------
     budget : (r,) risks; where not above 0 the level is infinite.
@@ -68,6 +72,7 @@ def level_of_risk(
     modes = np.count_nonzero(prior > 0, axis=0)
     plain = possible & (modes == 0)
     level[plain] = bias_0_m[plain] - sigma_0_m[plain] * ndtri(budget[plain] / 2)
+    level[~(level <= LARGEST_M)] = np.inf
     rows = np.flatnonzero(possible & (modes > 0))
     if rows.size == 0:
         return level
@@ -75,7 +80,13 @@ def level_of_risk(
     fix = sigma_0_m[rows], bias_0_m[rows]
     faults = prior[:, rows], offset_m[:, rows], sigma_m[:, rows]
     low, high = _bracket(rho, modes[rows], *fix, *faults)
-    level[rows] = _closed(low, high, rho, fix, faults)
+    near = high <= LARGEST_M
+    if not near.all():
+        rows, low, high, rho = rows[near], low[near], high[near], rho[near]
+        fix = fix[0][near], fix[1][near]
+        faults = faults[0][:, near], faults[1][:, near], faults[2][:, near]
+    if rows.size:
+        level[rows] = _closed(low, high, rho, fix, faults)
     return level
 
 
@@ -87,14 +98,24 @@ def _bracket(
     share = rho / (modes + 1)
     least = bias_0_m - sigma_0_m * ndtri(rho / 2)
     most = bias_0_m - sigma_0_m * ndtri(share / 2)
-    # Where a prior does not reach the budget the quantile is -inf or NaN and takes no part.
-    with np.errstate(divide="ignore", invalid="ignore"):
+    # Where a prior does not reach the budget the quantile is -inf or NaN and takes no part;
+    # infinite biases make an infinite upper end.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         alone = np.where(prior > rho, offset_m - sigma_m * ndtri(rho / prior), -np.inf)
         part = np.minimum(ndtri(share / prior), 0.0)
         together = np.where(prior > share, offset_m - sigma_m * part, -np.inf)
-    low = np.maximum(least, alone.max(axis=0))
-    high = np.maximum(np.maximum(most, together.max(axis=0)), low)
-    return low - _GUARD * (1 + np.abs(low)), high + _GUARD * (1 + np.abs(high))
+        low = np.maximum(least, alone.max(axis=0))
+        high = np.maximum(np.maximum(most, together.max(axis=0)), low)
+        return low - _GUARD * (1 + np.abs(low)), high + _GUARD * (1 + np.abs(high))
+
+
+def _log_ratio(
+    level: Floats, rho: Floats, fix: tuple[Floats, ...], faults: tuple[Floats, ...]
+) -> Floats:
+    """Logarithm of risk over budget; -inf where the risk is too small for a number."""
+    with np.errstate(divide="ignore"):
+        ratio: Floats = np.log(risk_of_level(level, *fix, *faults) / rho)
+    return ratio
 
 
 def _closed(
@@ -103,8 +124,8 @@ def _closed(
     """Upper ends of brackets, closed until they are `TOLERANCE_M` wide."""
     result = high.copy()
     rows: NDArray[np.intp] = np.arange(low.size)
-    g_low = np.log(risk_of_level(low, *fix, *faults) / rho)
-    g_high = np.log(risk_of_level(high, *fix, *faults) / rho)
+    g_low = _log_ratio(low, rho, fix, faults)
+    g_high = _log_ratio(high, rho, fix, faults)
     tolerance = np.maximum(TOLERANCE_M, 1e-14 * np.abs(high))
     kept = np.zeros(low.size)
     for step in range(_MOST_STEPS):
@@ -129,7 +150,7 @@ def _closed(
             # Never on an end: near the root the next step then lands on its other side.
             near = np.minimum(0.4 * tolerance, 0.5 * width)
             x = np.clip(x, low + near, high - near)
-        g = np.log(risk_of_level(x, *fix, *faults) / rho)
+        g = _log_ratio(x, rho, fix, faults)
         fits = g < -_TIE
         high, low = np.where(fits, x, high), np.where(fits, low, x)
         # Illinois: an end that is kept twice running counts half.

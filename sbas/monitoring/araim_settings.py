@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from numbers import Real
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ class AraimSettings:
 
     Parameters
     ----------
-    p_satellite : prior of a fault of one satellite, in [0, 1).
+    p_satellite : prior of a fault of one satellite, in [0, 1); SBAS satellites have that of GPS.
     p_constellation : prior of a fault of a whole constellation, in [0, 1). A single constellation
         gets a finite level only where this is far below the integrity budgets.
     phmi_v, phmi_h : integrity risk allowed up and horizontally, in [0, 1). With `phmi_v=0` there
@@ -60,21 +61,25 @@ class AraimSettings:
         for name in ("p_satellite", "p_constellation"):
             value = getattr(self, name)
             for number in value.values() if isinstance(value, Mapping) else (value,):
-                _require(name, number, 0 <= number < 1, "in [0, 1)")
+                _require_probability(name, number, or_zero=True)
+            if isinstance(value, Mapping) and "S" in value:
+                raise InputError(
+                    "SBAS satellites keep GPS time: they have the priors of GPS",
+                    where=name,
+                    evidence=f"a value for S: {value['S']!r}",
+                    cure="leave S out; G counts for both",
+                )
         for name in ("phmi_v", "phmi_h"):
-            number = getattr(self, name)
-            _require(name, number, 0 <= number < 1, "in [0, 1)")
-        total = self.phmi_v + self.phmi_h
-        _require("phmi_v + phmi_h", total, 0 < total < 1, "in (0, 1)")
+            _require_probability(name, getattr(self, name), or_zero=True)
+        _require_probability("phmi_v + phmi_h", self.phmi_v + self.phmi_h)
         for name in ("pfa_v", "pfa_h", "p_thres", "p_emt"):
-            number = getattr(self, name)
-            _require(name, number, 0 < number < 1, "in (0, 1)")
+            _require_probability(name, getattr(self, name))
         if self.most_faults is not None and (
             isinstance(self.most_faults, bool)
             or not isinstance(self.most_faults, int)
             or self.most_faults < 1
         ):
-            _require("most_faults", self.most_faults, False, "a whole number from 1, or None")
+            raise _wrong("most_faults", self.most_faults, "a whole number from 1, or None")
         if self.axis_budget not in ("along", "split"):
             raise InputError(
                 "unknown axis budget",
@@ -114,15 +119,20 @@ def by_constellation(name: str, value: PerConstellation, letters: tuple[str, ...
         raise InputError(
             f"no {name} for constellation {', '.join(missing)}",
             where=name,
-            evidence=f"given for {', '.join(value) or 'none'}",
+            evidence=f"given for {', '.join(map(str, value)) or 'none'}",
             cure=f"{name}={{..., {missing[0]!r}: ...}}, or mask its satellites",
         )
     return np.array([float(value[letter]) for letter in letters])
 
 
-def _require(name: str, value: Any, holds: bool, range_text: str) -> None:
-    if not holds or not math.isfinite(value):
-        raise InputError(
-            f"{name} must be {range_text}", where=name, evidence=f"{value!r}",
-            cure=f"give {name} {range_text}",
-        )  # fmt: skip
+def _require_probability(name: str, value: object, *, or_zero: bool = False) -> None:
+    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    if not (0 < number < 1 or (or_zero and number == 0)):
+        raise _wrong(name, value, "a number in [0, 1)" if or_zero else "a number in (0, 1)")
+
+
+def _wrong(name: str, value: object, range_text: str) -> InputError:
+    return InputError(
+        f"{name} must be {range_text}", where=name, evidence=f"{value!r}",
+        cure=f"give {name} {range_text}",
+    )  # fmt: skip

@@ -66,7 +66,8 @@ def complete_fix(fix: Geometry, axes: Floats, errors: Errors) -> tuple[Floats, F
     """Sigma, bias bound and accuracy sigma, each (q, n) [m], of the fix with every satellite."""
     gain = along_axes(fix.gain, axes)
     sigma = np.stack([np.sqrt(variance(fix.covariance, axis)) for axis in axes])
-    bias = (np.abs(gain) * errors.bias_m).sum(axis=1)
+    with np.errstate(over="ignore"):
+        bias = (np.abs(gain) * errors.bias_m).sum(axis=1)
     accuracy = np.sqrt((gain**2 * errors.accuracy_m2).sum(axis=1))
     return sigma, bias, accuracy
 

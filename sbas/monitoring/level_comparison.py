@@ -19,8 +19,9 @@ from sbas.exceptions import InputError
 from sbas.monitoring.detection_constants import upper_tail
 from sbas.monitoring.normal_equations import Floats
 from sbas.monitoring.raim_result import RaimResult
-from sbas.monitoring.recorded_ranges import Sigma, has_ranges
-from sbas.monitoring.recording_monitor import raim
+from sbas.monitoring.recorded_ranges import Sigma
+from sbas.monitoring.recording_monitor import raim, takes_ranges
+from sbas.monitoring.separation import SeparationBudget
 from sbas.monitoring.verdicts import Verdict
 from sbas.recording import Recording, with_columns
 
@@ -34,13 +35,17 @@ class LevelComparison:
 
     Parameters
     ----------
-    levels : by time: `hpl_m`, `herl_m` (NaN where RAIM is not available: a gap, not 0), `hdop`,
-        `n_sv` ranges, `like_hpl_m` the level of solution separation with the risk of the HPL,
-        `hpl_slope_m`, `sigma_major_m`, `available`. `like_hpl_m` and `sigma_major_m` are absent
-        where the levels are the receiver's own.
+    levels : by time: `hpl_m`, `herl_m` (NaN where RAIM is not available: a gap, not 0; infinite
+        where that is because a fault would not show), `hdop`, `n_sv` ranges, `like_hpl_m` the
+        level of solution separation with the risk of the HPL, `hpl_slope_m`, `sigma_major_m`,
+        `available`. `like_hpl_m` and `sigma_major_m` are absent where the levels are the
+        recording's own.
     risk : of the HPL, which `like_hpl_m` shares; None without `like_hpl_m`.
-    by_satellites : by number of ranges: epochs, `fix`, `tested`, `identifies`, `available`.
-    both : 2 x 2 epochs: rows SBAS available no, yes; columns RAIM available no, yes.
+    by_satellites : by number of ranges, -1 where it is not known: epochs, `fix`, `tested`,
+        `identifies`, `available`.
+    both : 2 x 2 epochs: rows SBAS available no, yes; columns RAIM available no, yes. RAIM is
+        available with `like_hpl_m` below the alert limit; without that level, where the verdict
+        passed: HERL is no bound to hold against a limit.
     """
 
     levels: pd.DataFrame
@@ -51,11 +56,21 @@ class LevelComparison:
     alert_limit_m: float | None
 
     def ratio(self, name: str) -> Floats:
-        """Ratios of a level to the HPL, where both are finite and RAIM is available."""
-        rows = self.levels["available"].to_numpy()
-        values = self.levels[name].to_numpy()[rows] / self.levels["hpl_m"].to_numpy()[rows]
-        known: Floats = values[np.isfinite(values)]
-        return known
+        """Ratios of a level to the HPL, where both are finite and above 0 and RAIM is available."""
+        level, hpl = self.levels[name].to_numpy(), self.levels["hpl_m"].to_numpy()
+        known = self.levels["available"].to_numpy() & (level > 0) & (hpl > 0)
+        known &= np.isfinite(level) & np.isfinite(hpl)
+        ratio: Floats = level[known] / hpl[known]
+        return ratio[np.isfinite(ratio) & (ratio > 0)]
+
+    @property
+    def raim_words(self) -> str:
+        """What makes RAIM available in `both`."""
+        if self.risk is None:
+            return "its verdict passed; HERL is no bound to hold against a limit"
+        if self.alert_limit_m is None:
+            return "its level with the risk of the HPL is finite"
+        return f"its level with the risk of the HPL lies below {self.alert_limit_m:g} m"
 
     @property
     def herl_is_usually_larger(self) -> bool | None:
@@ -68,7 +83,7 @@ class LevelComparison:
         """The delta0 with which HERL would be larger than HPL at half of the epochs.
 
         HERL is proportional to delta0, which is a setting of the receiver: the paper's statement
-        holds above this value and fails below. None with the receiver's own HERL.
+        holds above this value and fails below. None where the settings behind HERL are not known.
         """
         ratio = self.ratio("herl_m")
         if self.raim.design is None or not ratio.size:
@@ -106,7 +121,7 @@ class LevelComparison:
                 f"hold. "
             )
         else:
-            text += "The receiver's probabilities are not known; HERL is not a bound. "
+            text += "The probabilities behind HERL are not known; HERL is not a bound. "
         correlation = self.herl_hdop_correlation
         if correlation is not None:
             text += f"Rank correlation of HERL and HDOP: {correlation:.2f}. "
@@ -136,6 +151,7 @@ class LevelComparison:
             "epochs": len(self.levels),
             "over_hpl": ratios,
             "herl_is_usually_larger": self.herl_is_usually_larger,
+            "source": self.raim.source,
             "delta0": None if self.raim.design is None else self.raim.design.shift,
             "delta0_of_equal_levels": self.even_shift,
             "herl_hdop_correlation": self.herl_hdop_correlation,
@@ -147,11 +163,13 @@ class LevelComparison:
                 "sbas_only": int(self.both[1, 0]),
                 "both": int(self.both[1, 1]),
             },
+            "raim_available_where": self.raim_words,
             "by_satellites": {
-                str(n): {name: int(v) for name, v in row.items()}
+                str(n) if int(str(n)) >= 0 else "unknown": {name: int(v) for name, v in row.items()}
                 for n, row in self.by_satellites.to_dict("index").items()
             },
             "statement": self.statement(),
+            "findings": [f.to_dict() for f in self.raim.findings],
         }
 
     def __repr__(self) -> str:
@@ -179,6 +197,7 @@ def raim_against_sbas(
     missed_detection: float = 1e-4,
     outlier_alarm: float = 1e-4,
     sigma: Sigma = None,
+    elevation_mask_deg: float | None = None,
     alert_limit_m: float | None = None,
 ) -> LevelComparison:
     """Levels of RAIM and SBAS on the epochs of one recording.
@@ -187,43 +206,52 @@ def raim_against_sbas(
     ----------
     recording : with `hpl_m`, and with ranges or the receiver's own HERL.
     risk : of the HPL, per sample; None takes that of the recording's horizontal factor.
-    prior, false_alarm, missed_detection, outlier_alarm, sigma : see `raim`.
-    alert_limit_m : where given, a service is available only with its level below it.
+    prior, false_alarm, missed_detection, outlier_alarm, sigma, elevation_mask_deg : see `raim`.
+    alert_limit_m : where given, a service is available only with its level below it; RAIM that
+        the recording has without ranges is available by its verdict alone.
 
     Raises
     ------
-    InputError : no HPL, or a factor that is not known and no risk.
+    InputError : no HPL, a factor that is not known and no risk, or settings of levels from ranges
+        for a recording without them.
     """
     if "hpl_m" not in recording.columns:
         raise InputError("the recording has no HPL to compare with", cure="sbas protect")
     if alert_limit_m is not None and not 0 < alert_limit_m < math.inf:
         raise InputError("an alert limit is a number above 0 [m]", evidence=f"{alert_limit_m}")
-    if has_ranges(recording):
+    if takes_ranges(recording, sigma) or "herl_m" not in recording.columns:
         risk = _risk_of(recording) if risk is None else risk
-        result = raim(
-            recording, false_alarm=false_alarm, missed_detection=missed_detection,
-            outlier_alarm=outlier_alarm, risk=risk, prior=prior, sigma=sigma,
+    elif risk is not None:
+        raise InputError(
+            "a risk is of levels from ranges: the recording has HERL alone, which has none",
+            where="risk", cure="leave it out, or give a recording with ranges: sbas protect",
         )  # fmt: skip
-    else:
-        result, risk = raim(recording), None
+    result = raim(
+        recording, false_alarm=false_alarm, missed_detection=missed_detection,
+        outlier_alarm=outlier_alarm, risk=SeparationBudget.risk if risk is None else risk,
+        prior=prior, sigma=sigma, elevation_mask_deg=elevation_mask_deg,
+    )  # fmt: skip
     epochs = result.epochs
     given = with_columns(recording.table, ("hpl_m", "hdop"))
     levels = pd.DataFrame({name: given[name].to_numpy() for name in given}, index=epochs.index)
     available = epochs["available"].to_numpy()
     levels["available"] = available
     levels["n_sv"] = epochs["n_sv"].to_numpy()
-    levels["herl_m"] = np.where(available, epochs["herl_m"].to_numpy(), np.nan)
     for name, own in (
+        ("herl_m", "herl_m"),
         ("hpl_slope_m", "hpl_slope_m"),
         ("like_hpl_m", "hpl_separation_m"),
         ("sigma_major_m", "sigma_major_m"),
     ):
         if own in epochs.columns:
-            levels[name] = np.where(available, epochs[own].to_numpy(), np.nan)
+            values = epochs[own].to_numpy()
+            levels[name] = np.where(available | np.isinf(values), values, np.nan)
     limit = math.inf if alert_limit_m is None else alert_limit_m
-    with_sbas = levels["hpl_m"].to_numpy() < limit
-    own_level = levels["like_hpl_m" if risk is not None else "herl_m"].to_numpy()
-    with_raim = available & (own_level < limit)
+    hpl = levels["hpl_m"].to_numpy()
+    with_sbas = (hpl > 0) & (hpl < limit)
+    with_raim = available
+    if risk is not None:
+        with_raim = available & (levels["like_hpl_m"].to_numpy() < limit)
     both = np.zeros((2, 2), np.int64)
     np.add.at(both, (with_sbas.astype(int), with_raim.astype(int)), 1)
     return LevelComparison(
@@ -234,7 +262,8 @@ def raim_against_sbas(
 def availability_by_satellites(result: RaimResult) -> pd.DataFrame:
     """Epochs by number of ranges: all, with a fix, tested, able to identify, available.
 
-    With the receiver's own RAIM only `epochs` and `available` are known.
+    The number is -1 where an epoch's ranges are not known to be those of its fix. Of RAIM that
+    the recording has without ranges only `epochs` and `available` are known.
     """
     epochs = result.epochs
     data = pd.DataFrame({"n_sv": epochs["n_sv"].to_numpy(), "epochs": 1})

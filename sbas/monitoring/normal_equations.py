@@ -31,6 +31,8 @@ SMALLEST_EIGENVALUE = 1e-10
 """Of the normal matrix over the sum of weights: a geometry below it (dilutions above some 1e4) is
 degenerate."""
 SMALLEST_REDUNDANCY = 1e-8
+SMALL_REDUNDANCY = 3e-2
+"""Below it 1 - leverage loses digits that a sum of squares in its place keeps."""
 NEGLIGIBLE_INFLUENCE = 1e-6
 """Share of an axis's sigma that a satellite without redundancy may move and still not matter."""
 _ROUNDING = 64 * np.finfo(float).eps
@@ -45,6 +47,7 @@ class RangeReason(IntEnum):
     NO_SIGMA = 3
     NO_RESIDUAL = 4
     ALONE = 5
+    NO_BIAS = 6
 
     @property
     def words(self) -> str:
@@ -58,6 +61,7 @@ _RANGE_WORDS = {
     RangeReason.NO_SIGMA: "no sigma above 0",
     RangeReason.NO_RESIDUAL: "no residual",
     RangeReason.ALONE: "alone in its constellation: it fixes its own clock only",
+    RangeReason.NO_BIAS: "no finite bound of its nominal bias",
 }
 
 
@@ -254,6 +258,14 @@ def geometry(given: Ranges, weight: Floats | None = None) -> Geometry:
     own_weight = sum(member[c] * clock_weight[c] for c in range(given.clocks)) + ~serves
     leverage = w / own_weight + (gain * centred).sum(axis=0)
     redundancy = np.where(serves, np.clip(1.0 - leverage, 0.0, 1.0), np.nan)
+    small = serves & (redundancy < SMALL_REDUNDANCY) & (solved & (dof >= 1))
+    if small.any():
+        at = np.nonzero(small)
+        epochs: Any = (..., *at[1:])
+        redundancy[at] = _small_redundancy(
+            at[0], redundancy[at], centred[epochs], w[epochs], member[epochs],
+            clock_weight[epochs], covariance[epochs],
+        )  # fmt: skip
     reason = np.where(dof == 0, GeometryReason.NO_REDUNDANCY, GeometryReason.SOUND)
     reason = np.where(degenerate, GeometryReason.DEGENERATE, reason)
     reason = np.where(~possible, GeometryReason.TOO_FEW, reason)
@@ -263,6 +275,26 @@ def geometry(given: Ranges, weight: Floats | None = None) -> Geometry:
         centred, w, member, clock_weight, covariance, gain, redundancy, least,
         satellites, clocks, dof, reason, solved,
     )  # fmt: skip
+
+
+def _small_redundancy(
+    own: Ints, first: Floats, rows: Floats, weight: Floats, member: Bools, clock_weight: Floats,
+    covariance: Floats,
+) -> Floats:  # fmt: skip
+    """(p,) redundancies of ranges `own`, each of one of p epochs, where 1 - leverage is rounding.
+
+    R = I - H of weighted ranges is a projector, r_i = sum_j R_ij^2, so that
+    r_i (1 - r_i) = sum over j != i of R_ij^2: positive terms, which lose no digit. `first`
+    (p,) are the redundancies as a difference, good enough for the factor 1 - r_i.
+    """
+    here = np.arange(own.size)
+    same = sum(
+        part * part[own, here] / total for part, total in zip(member, clock_weight, strict=True)
+    )
+    off = same + (times(covariance, rows[:, own, here])[:, None] * rows).sum(axis=0)
+    off[own, here] = 0.0
+    squares: Floats = (off * off * weight).sum(axis=0) * weight[own, here]
+    return squares / (1.0 - first)
 
 
 def _less_means(values: Floats, weight: Floats, member: Bools, clock_weight: Floats) -> Floats:
@@ -353,10 +385,13 @@ def adjust(g: Geometry, observed_m: Floats) -> Adjustment:
     an epoch is not solved everything is NaN.
     """
     y = np.where(g.weight > 0, observed_m, 0.0)
-    centred = _less_means(y, g.weight, g.member, g.clock_weight)
-    # The gain of centred ranges is that of the ranges: its sum over a constellation is 0.
-    x = (g.gain * centred).sum(axis=1)
-    e = centred - (g.rows * x[:, None]).sum(axis=0)
-    e = np.where(g.takes_part, e, np.nan)
-    t = np.where(g.solved, (g.weight * np.where(g.takes_part, e * e, 0.0)).sum(axis=0), np.nan)
+    # Ranges beyond all sense overflow to an infinite statistic, or to NaN: neither passes.
+    with np.errstate(over="ignore", invalid="ignore"):
+        centred = _less_means(y, g.weight, g.member, g.clock_weight)
+        # The gain of centred ranges is that of the ranges: its sum over a constellation is 0.
+        x = (g.gain * centred).sum(axis=1)
+        e = centred - (g.rows * x[:, None]).sum(axis=0)
+        e = np.where(g.takes_part, e, np.nan)
+        square = np.where(g.takes_part, e * e, 0.0)
+        t = np.where(g.solved, (g.weight * square).sum(axis=0), np.nan)
     return Adjustment(x, e, t)

@@ -33,11 +33,13 @@ class InjectedFaults:
     Parameters
     ----------
     table : one row a kind and size: `kind`; `size_m` of a step or of each of two faults, or
-        `rate_mps` of a ramp; `trials`; `detected`; `excluded_right` (passed without just the
-        faulty ranges), `excluded_wrong` (passed without other ones), `missed` (passed as it was);
-        `unavailable`; `error_median_m` and `error_max_m` of horizontal position errors that the
-        faults alone make in fixes that passed; `beyond_herl` of them beyond the HERL. Of ramps:
-        `delay_median_s` from the start to the detection, and the errors at the epoch before it.
+        `rate_mps` of a ramp; `trials`; `detected`; of those that passed after an exclusion,
+        `excluded_right` (all faulty ranges and nothing else), `excluded_part` (some of the faulty
+        ranges and nothing else: a fault stays in the fix) and `excluded_good` (a good range among
+        the excluded); `missed` (passed as it was); `unavailable`; `error_median_m` and
+        `error_max_m` of horizontal position errors that the faults alone make in fixes that
+        passed; `beyond_herl` of them beyond the HERL. Of ramps: `delay_median_s` from the start
+        to the detection, and the errors at the epoch before it.
     noise : "recorded" residuals, or "modelled" by the sigmas.
     seed : of the random choices.
     """
@@ -168,12 +170,14 @@ def _testable(part: _Epochs) -> Bools:
 
 @dataclass(frozen=True, eq=False)
 class _Outcome:
-    """(t,) outcomes of trials; `error_m` the horizontal error that the faults alone make in the
+    """(t,) outcomes of trials; `right` where all faulty ranges and nothing else were excluded,
+    `good` where a good one was; `error_m` the horizontal error that the faults alone make in the
     fix that stands, `herl_m` its HERL."""
 
     verdict: Ints
     detected: Bools
     right: Bools
+    good: Bools
     error_m: Floats
     herl_m: Floats
 
@@ -195,9 +199,10 @@ def _try(
         out = np.logical_or.reduce([slots == one for one in found.excluded])
         g = found.geometry
         step = (g.gain[:2] * np.where(g.weight > 0, bias, 0.0)).sum(axis=1)
-        right = (out == (bias != 0)).all(axis=0)
+        faulty = bias != 0
+        right, good = (out == faulty).all(axis=0), (out & ~faulty).any(axis=0)
         herl, _ = external_levels_m(g, d.shift)
-        pieces.append(_Outcome(found.verdict, found.detected, right, np.hypot(*step), herl))
+        pieces.append(_Outcome(found.verdict, found.detected, right, good, np.hypot(*step), herl))
     return _Outcome(
         *(np.concatenate([getattr(p, name) for p in pieces]) for name in vars(pieces[0]))
     )
@@ -249,7 +254,8 @@ def _ramps(
     delay = np.full(trials, np.nan)
     followed = np.zeros(trials, bool)
     whole = _Outcome(
-        np.zeros(trials, np.int8), np.zeros(trials, bool), np.zeros(trials, bool),
+        np.zeros(trials, np.int8),
+        np.zeros(trials, bool), np.zeros(trials, bool), np.zeros(trials, bool),
         np.full(trials, np.nan), np.full(trials, np.nan),
     )  # fmt: skip
     for ahead in range(1, part.column.size):
@@ -290,7 +296,8 @@ def _row(
         "trials": int(out.verdict.size),
         "detected": int(out.detected.sum()),
         "excluded_right": int((after & out.right).sum()),
-        "excluded_wrong": int((after & ~out.right).sum()),
+        "excluded_part": int((after & ~out.right & ~out.good).sum()),
+        "excluded_good": int((after & out.good).sum()),
         "missed": int(passed.sum()),
         "unavailable": int((out.verdict == Verdict.NOT_AVAILABLE).sum()),
         "error_median_m": float(np.median(error)) if error.size else np.nan,

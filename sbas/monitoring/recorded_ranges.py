@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from numbers import Real
+from typing import Any, TypeGuard
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from sbas.exceptions import InputError
 from sbas.findings import Finding
+from sbas.monitoring.direction_units import radians_in
 from sbas.monitoring.normal_equations import Bools, Floats, Ints
 from sbas.monitoring.verdicts import MonitorReason
 from sbas.recording import Recording
@@ -18,7 +20,6 @@ from sbas.satellite_table import SIDE_TABLE
 
 SYSTEMS = "GRECJI"
 """RINEX letters of constellations with a clock of their own; SBAS satellites (S) keep GPS time."""
-RADIANS_BELOW = 6.3
 USUAL_SIGMA_M = 0.05, 50.0
 NEEDED = ("satellite", "elevation_deg", "azimuth_deg", "used")
 
@@ -63,13 +64,16 @@ def recorded_ranges(
     ----------
     sigma : None takes `sigma_m` of the satellite table; a number is the 1-sigma of every range
         [m]; two numbers a, b [m] mean the root of a^2 + (b / sin elevation)^2.
-    elevation_mask_deg : ranges below take no part, as if the fix had not used them.
+    elevation_mask_deg : ranges below take no part, as if the fix had not used them; 0 to 90.
 
     Raises
     ------
-    InputError : no such table, angles in radians, elevations beyond 90 degrees, or satellites of
-        no known constellation.
+    InputError : no such table, columns of another type, angles in radians, elevations beyond 90
+        degrees, sigmas of used ranges that are 0 or less, satellites of no known constellation,
+        or a sigma or mask that is none.
     """
+    low_deg = _mask(elevation_mask_deg)
+    model = None if sigma is None else _sigma_model(sigma)
     side = recording.side_tables.get(SIDE_TABLE)
     needed = NEEDED if sigma is not None else (*NEEDED, "sigma_m")
     lacking = needed if side is None else [name for name in needed if name not in side.columns]
@@ -77,28 +81,27 @@ def recorded_ranges(
         raise InputError(
             "the recording does not say which satellites were used, and how",
             evidence=f"side table {SIDE_TABLE!r}: no {', '.join(lacking)}",
-            cure="sbas protect makes such a recording; with ranges of unknown sigma give --sigma",
+            cure="sbas protect makes such a recording; with ranges of unknown sigma give sigma= "
+            "(sbas raim --sigma) in metres",
         )
-    rows = np.flatnonzero(side["used"].to_numpy())
-    stamps = side["time"].to_numpy()[rows].astype("M8[ns]").astype(np.int64)
+    rows = np.flatnonzero(_used(side["used"]))
+    stamps = _times(side["time"])[rows]
     order = np.argsort(stamps, kind="stable")
     rows, stamps = rows[order], stamps[order]
-    elevation, azimuth = (
-        side[name].to_numpy(np.float64)[rows] for name in ("elevation_deg", "azimuth_deg")
-    )
-    _check_angles(elevation, azimuth)
+    elevation, azimuth = (_numbers(side[name])[rows] for name in ("elevation_deg", "azimuth_deg"))
+    _check_angles(elevation, azimuth, stamps)
     code, names, clock_of = _satellites(side["satellite"])
     code = code[rows]
     clock = clock_of[code]
-    spread = _sigmas(side, rows, elevation, sigma)
+    low = elevation < low_deg
+    if model is None:
+        spread = _numbers(side["sigma_m"])[rows]
+        _check_sigmas(spread[~low])
+    else:
+        spread = _modelled(model, elevation)
     has_residuals = "residual_m" in side.columns
-    residual = (
-        side["residual_m"].to_numpy(np.float64)[rows] if has_residuals else np.zeros(rows.size)
-    )
+    residual = _numbers(side["residual_m"])[rows] if has_residuals else np.zeros(rows.size)
     findings = list(_sigma_findings(spread))
-    low = (
-        np.zeros(rows.size, bool) if elevation_mask_deg is None else elevation < elevation_mask_deg
-    )
     epoch, slot, reason, lost = _places(recording, stamps)
     if lost:
         findings.append(
@@ -112,8 +115,8 @@ def recorded_ranges(
     known = epoch >= 0
     sound = np.isfinite(elevation + azimuth) & np.isfinite(spread) & (spread > 0)
     sound &= (np.isfinite(residual) & (code >= 0)) | low
-    faulty = known & ~sound & ~low
-    reason[epoch[faulty & (reason[epoch] == 0)]] = MonitorReason.INCOMPLETE
+    faulty = epoch[known & ~sound & ~low]
+    reason[faulty[reason[faulty] == 0]] = MonitorReason.INCOMPLETE
     key = epoch * (len(names) + 1) + code + 1
     _, first, count = np.unique(key, return_index=True, return_counts=True)
     twice = epoch[first[count > 1]]
@@ -154,33 +157,115 @@ def _satellites(column: pd.Series) -> tuple[Ints, tuple[str, ...], Ints]:
     return code, names, np.array([*numbers, 0], np.int64)
 
 
-def _check_angles(elevation_deg: Floats, azimuth_deg: Floats) -> None:
-    e, a = (np.abs(values[np.isfinite(values)]) for values in (elevation_deg, azimuth_deg))
-    if e.size and e.max() > 90:
+def _used(column: pd.Series) -> Bools:
+    """Which rows are used: a range of which that is not known is not the fix's, nor is it none."""
+    kind = column.dtype
+    if isinstance(kind, pd.CategoricalDtype) or not pd.api.types.is_bool_dtype(kind):
+        raise InputError(
+            "which satellites were used is said by booleans", where=_column("used"),
+            evidence=f"values of type {kind}", cure="True or False in every row",
+        )  # fmt: skip
+    unknown = int(column.isna().sum())
+    if unknown:
+        raise InputError(
+            "of some satellites it is not said whether they were used", where=_column("used"),
+            evidence=f"{unknown} rows of {len(column)}", cure="True or False in every row",
+        )  # fmt: skip
+    known: Bools = column.to_numpy(np.bool_)
+    return known
+
+
+def _times(column: pd.Series) -> Ints:
+    """Nanoseconds of GPS time."""
+    if not isinstance(column.dtype, np.dtype) or column.dtype.kind != "M":
+        raise InputError(
+            "times of satellites must be dates without a time zone", where=_column("time"),
+            evidence=f"values of type {column.dtype}", cure="GPS time as datetime64[ns]",
+        )  # fmt: skip
+    stamps: Ints = column.to_numpy().astype("M8[ns]").astype(np.int64)
+    return stamps
+
+
+def _numbers(column: pd.Series) -> Floats:
+    """Values with NaN where there is none."""
+    if pd.api.types.is_bool_dtype(column.dtype) or not pd.api.types.is_numeric_dtype(column.dtype):
+        raise InputError(
+            "values of satellites must be numbers", where=_column(str(column.name)),
+            evidence=f"values of type {column.dtype}", cure="NaN where unknown",
+        )  # fmt: skip
+    values: Floats = column.to_numpy(np.float64, na_value=np.nan)
+    return values
+
+
+def _column(name: str) -> str:
+    return f"side table {SIDE_TABLE!r}, column {name!r}"
+
+
+def _check_angles(elevation_deg: Floats, azimuth_deg: Floats, stamps: Ints) -> None:
+    """Refuse directions that are none; rows are in the order of their times."""
+    steepest = np.abs(elevation_deg[np.isfinite(elevation_deg)]).max(initial=0.0)
+    if steepest > 90:
         raise InputError(
             "elevations beyond 90 degrees", code="E08", where="elevation_deg",
-            evidence=f"up to {e.max():g}", cure="degrees above the horizon",
+            evidence=f"up to {steepest:g}", cure="degrees above the horizon",
         )  # fmt: skip
-    # A few satellites in one place low in the north are no proof; many epochs are.
-    if e.size >= 20 and e.max() <= RADIANS_BELOW / 4 and a.max(initial=0) <= RADIANS_BELOW:
+    epoch = np.cumsum(np.diff(stamps, prepend=stamps[:1]) != 0)
+    evidence = radians_in(elevation_deg, azimuth_deg, epoch)
+    if evidence:
         raise InputError(
             "directions of satellites look like radians", code="E08",
-            evidence=f"elevations up to {e.max():g}, azimuths up to {a.max(initial=0):g}",
-            cure="give degrees",
+            where=f"side table {SIDE_TABLE!r}", evidence=evidence, cure="give degrees",
         )  # fmt: skip
 
 
-def _sigmas(side: pd.DataFrame, rows: Ints, elevation_deg: Floats, sigma: Sigma) -> Floats:
-    if sigma is None:
-        values: Floats = side["sigma_m"].to_numpy(np.float64)[rows]
-        return values
-    a, b = (sigma, 0.0) if not isinstance(sigma, tuple) else sigma
-    if not (0 <= a < np.inf and 0 <= b < np.inf and a + b > 0):
-        raise InputError("sigma needs numbers of 0 or more, one above 0 [m]", evidence=f"{sigma}")
+def _mask(elevation_mask_deg: float | None) -> float:
+    """The elevation [deg] below which ranges take no part."""
+    if elevation_mask_deg is None:
+        return -np.inf
+    if not _real(elevation_mask_deg) or not 0 <= elevation_mask_deg <= 90:
+        raise InputError(
+            "the elevation mask lies between 0 and 90 degrees", where="elevation_mask_deg",
+            evidence=f"{elevation_mask_deg!r}", cure="None for no mask",
+        )  # fmt: skip
+    return float(elevation_mask_deg)
+
+
+def _sigma_model(sigma: object) -> tuple[float, float]:
+    """The two numbers of a model of the elevation."""
+    parts = sigma if isinstance(sigma, tuple) else (sigma, 0.0)
+    if (
+        len(parts) != 2
+        or not all(_real(part) and 0 <= part < np.inf for part in parts)
+        or not sum(parts) > 0
+    ):
+        raise InputError(
+            "sigma needs a number, or two in a tuple, of 0 or more, one above 0 [m]",
+            where="sigma", evidence=f"{sigma!r}",
+            cure="sigma=3.0, or sigma=(0.3, 0.3) for the root of a^2 + (b / sin elevation)^2",
+        )  # fmt: skip
+    return float(parts[0]), float(parts[1])
+
+
+def _real(value: object) -> TypeGuard[float]:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _modelled(model: tuple[float, float], elevation_deg: Floats) -> Floats:
+    a, b = model
     with np.errstate(divide="ignore", invalid="ignore"):
         slant = np.where(b > 0, b / np.sin(np.deg2rad(np.maximum(elevation_deg, 0.0))), 0.0)
-    model: Floats = np.hypot(a, slant)
-    return model
+    spread: Floats = np.hypot(a, slant)
+    return spread
+
+
+def _check_sigmas(sigma_m: Floats) -> None:
+    none = sigma_m <= 0
+    if none.any():
+        raise InputError(
+            "sigmas of used ranges are 0 or less", code="E08", where=_column("sigma_m"),
+            evidence=f"{int(none.sum())} of {sigma_m.size} ranges, down to {sigma_m[none].min():g}",
+            cure="NaN where the sigma is not known; sigma= (--sigma) gives one to all",
+        )  # fmt: skip
 
 
 def _sigma_findings(sigma_m: Floats) -> tuple[Finding, ...]:
@@ -192,7 +277,7 @@ def _sigma_findings(sigma_m: Floats) -> tuple[Finding, ...]:
         Finding(
             "E08", "warning", "the ranges' sigmas are unusual: variances, or another unit?",
             where="sigma_m", evidence=f"median {middle:g} m",
-            cure="give 1-sigma in metres; --sigma sets it",
+            cure="give 1-sigma in metres; sigma= (--sigma) sets it",
         ),
     )  # fmt: skip
 

@@ -69,6 +69,6 @@ _REASONS = {
     MonitorReason.RIVALS: "two ranges cannot be told apart: nobody knows which is at fault",
     MonitorReason.STILL_FAULTY: "a fault remains, and no further range may be excluded",
     MonitorReason.ONE_SPARE: "one spare satellite detects and cannot identify",
-    MonitorReason.RECEIVER: "the receiver says so",
-    MonitorReason.NOT_STATED: "the receiver does not say",
+    MonitorReason.RECEIVER: "the recording's flag says so",
+    MonitorReason.NOT_STATED: "no flag of the recording says",
 }

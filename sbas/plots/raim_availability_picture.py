@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 SHEET = Sheet(FULL_WIDTH, 3.1, left=0.62, right=2.1, bottom=0.75, top=0.15)
 _KINDS = (
-    ("no fix", LINE, ""),
+    ("no fix, or not known", LINE, ""),
     ("fix, no test", VERMILION, "////"),
     ("detection only", ORANGE, "...."),
     ("identification", SKY, ""),
@@ -45,7 +45,8 @@ def raim_availability(comparison: LevelComparison, *, ax: Axes | None = None) ->
 
     Returns
     -------
-    The axes. The left bar of each pair: no fix, a fix without a test, a test that detects, one
+    The axes. The left bar of each pair: no fix (or, where the number of satellites is "unknown",
+    a fix whose ranges the recording does not have), a fix without a test, a test that detects, one
     that identifies the faulty range as well; the right bar: epochs at which RAIM is available.
     Below stand satellites and epochs; the text counts epochs with SBAS, RAIM, both and neither.
 
@@ -71,7 +72,7 @@ def raim_availability(comparison: LevelComparison, *, ax: Axes | None = None) ->
             at + 0.22, share, width=0.36, color=BLUE,
             label=f"RAIM available: {int(table['available'].iloc[-1]):,}",
         )  # fmt: skip
-        # A receiver that does not say how many it uses has -1 in its table.
+        # -1 is no number: a receiver that does not say, or ranges that are not those of the fix.
         names = [
             "all" if name == "all" else f"{name:g}" if name >= 0 else "unknown"
             for name in table.index
@@ -112,8 +113,10 @@ def _stacks(ax: Axes, at: np.ndarray, table: pd.DataFrame, epochs: np.ndarray) -
 def _both_words(comparison: LevelComparison) -> str:
     (neither, raim), (sbas, both) = comparison.both.tolist()
     limit = comparison.alert_limit_m
-    head = "a level of" if limit is None else f"a level below {limit:g} m of"
+    below = "" if limit is None else f" below {limit:g} m"
+    # HERL is no bound: RAIM that has nothing else is counted by its verdict.
+    other = "its verdict" if comparison.risk is None else f"its level{below}"
     return (
-        f"epochs with {head}\nSBAS and RAIM: {both:,}\nSBAS alone: {sbas:,}\n"
-        f"RAIM alone: {raim:,}\nneither: {neither:,}"
+        f"epochs with SBAS (HPL{below})\nand RAIM ({other})\nSBAS and RAIM: {both:,}\n"
+        f"SBAS alone: {sbas:,}\nRAIM alone: {raim:,}\nneither: {neither:,}"
     )

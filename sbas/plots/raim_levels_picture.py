@@ -59,7 +59,8 @@ def raim_levels(comparison: LevelComparison, *, axes: Sequence[Axes] | None = No
     -------
     (2,) the axes. Each stroke spans the smallest and largest value of its time bin, so that no
     spike is lost; a bin without a value stays empty. Bars at the foot stand for bins with epochs
-    at which RAIM is not available, bars at the head for bins with an infinite HERL.
+    at which RAIM is not available, bars at the head for bins with an infinite HERL: there a fault
+    would not show, which is one of the reasons why RAIM is not available.
 
     References
     ----------
@@ -104,6 +105,9 @@ def raim_levels(comparison: LevelComparison, *, axes: Sequence[Axes] | None = No
         text = "HERL is not a bound"
         if lacking:
             text += f"; grey at the foot: RAIM not available ({lacking:,} epochs)"
+        endless = int(np.isinf(levels["herl_m"]).sum())
+        if endless:
+            text += f"; red at the head: HERL infinite ({endless:,})"
         _beside_first_label(upper, text, 13)
         return np.array([upper, lower], dtype=object)
 
@@ -118,9 +122,9 @@ def raim_level_ratios(comparison: LevelComparison, *, ax: Axes | None = None) ->
 
     Returns
     -------
-    The axes. Only epochs count at which RAIM is available and both levels are finite; the legend
-    has their number. A curve right of 1 is a level larger than the HPL. The level by solution
-    separation has the HPL's own risk and alone is like it.
+    The axes. Only epochs count at which RAIM is available and both levels are finite and above 0;
+    the legend has their number. A curve right of 1 is a level larger than the HPL. The level by
+    solution separation has the HPL's own risk and alone is like it.
 
     References
     ----------
@@ -166,7 +170,7 @@ def raim_level_ratios(comparison: LevelComparison, *, ax: Axes | None = None) ->
 def _herl_words(comparison: LevelComparison) -> str:
     design = comparison.raim.design
     rates = (
-        "alpha, beta: the receiver's"
+        "alpha, beta not stated"
         if design is None
         else f"alpha={design.outlier_alarm:g}, beta={design.missed_detection:g}"
     )

@@ -15,6 +15,7 @@ from sbas.plots.style import (
     LINE,
     MUTED,
     ORANGE,
+    PURPLE,
     SKY,
     VERMILION,
     Sheet,
@@ -27,11 +28,12 @@ if TYPE_CHECKING:
 
 SHEET = Sheet(FULL_WIDTH, 3.4, left=0.62, right=2.05, bottom=0.55, top=0.5)
 _OUTCOMES = (
-    ("excluded_right", "found, right range excluded", BLUE, ""),
-    ("kept", "found, not excluded", SKY, ""),
+    ("excluded_right", "found, all faults excluded", BLUE, ""),
+    ("kept", "found, nothing excluded", SKY, ""),
     ("unavailable", "no test", LINE, ""),
     ("missed", "missed", ORANGE, "...."),
-    ("excluded_wrong", "found, wrong range excluded", VERMILION, "////"),
+    ("excluded_part", "one fault excluded, one left in", PURPLE, "xxxx"),
+    ("excluded_good", "good range excluded", VERMILION, "////"),
 )
 _KINDS = {
     "step": ("one step", "size_m", "[m]"),
@@ -52,9 +54,11 @@ def range_faults(faults: InjectedFaults | pd.DataFrame, *, ax: Axes | None = Non
 
     Returns
     -------
-    The axes. A bar for each size or rate, in groups of steps, two steps at once, and ramps. Above
-    each stand the largest horizontal error that the fault alone made in a fix that passed [m] (of
-    a ramp: in the epoch before it was found), and for ramps the median time until found [s].
+    The axes. A bar for each size or rate, in groups of steps, two steps at once, and ramps. What
+    passed after an exclusion is parted into all faults excluded, one of two left in, and a good
+    range excluded. Above each stand the largest horizontal error that the faults alone made in a
+    fix that passed [m] (of a ramp: in the epoch before it was found), and for ramps the median
+    time until found [s].
 
     References
     ----------
@@ -72,8 +76,8 @@ def range_faults(faults: InjectedFaults | pd.DataFrame, *, ax: Axes | None = Non
         shift = rows["kind"].map({kind: _GAP * i for i, kind in enumerate(kinds)}).to_numpy(float)
         at = np.arange(len(rows)) + shift
         trials = rows["trials"].to_numpy(float)
-        found = rows[["excluded_right", "unavailable", "missed", "excluded_wrong"]]
-        rows["kept"] = rows["trials"] - found.sum(axis=1)
+        told = [name for name, *_ in _OUTCOMES if name != "kept"]
+        rows["kept"] = rows["trials"] - rows[told].sum(axis=1)
         foot = np.zeros(len(rows))
         for name, words, colour, hatch in _OUTCOMES:
             with np.errstate(invalid="ignore"):

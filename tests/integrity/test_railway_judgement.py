@@ -13,7 +13,7 @@ from sbas.estimate import Refusal
 from sbas.integrity.k_factors import k_factor
 from sbas.integrity.railway_judgement import railway_judgement
 from sbas.integrity.results import Evaluation
-from tests.plots.synthetic import TRUTH, synthetic_recording
+from tests.plots.synthetic import TRUTH, evaluated, synthetic_recording
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_without_truth_the_seen_sigma_is_refused() -> None:
 
 
 def test_a_short_record_is_no_verdict() -> None:
-    judged = railway_judgement(sbas.evaluate(synthetic_recording(3000), truth=TRUTH))
+    judged = railway_judgement(evaluated("ordinary"))
     assert isinstance(judged, Refusal)
 
 

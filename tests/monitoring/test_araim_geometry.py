@@ -55,6 +55,19 @@ def test_radians_are_refused_with_a_cure() -> None:
         )
 
 
+def test_elevations_in_radians_are_noticed_alone() -> None:
+    with pytest.raises(InputError, match="radians"):
+        changed(elevation_deg=np.deg2rad(appendix_d()["elevation_deg"]))
+
+
+def test_sbas_satellites_keep_the_time_of_gps() -> None:
+    letters, index, known = changed(constellation=list("GGGGGEEEES")).clocks()
+    assert letters == ("G", "E")
+    assert index[0].tolist() == [0] * 5 + [1] * 4 + [0]
+    assert known.all()
+    assert changed(constellation=list("EEEEESSSSS")).clocks()[0] == ("G", "E")
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
@@ -63,6 +76,11 @@ def test_radians_are_refused_with_a_cure() -> None:
         ({"sigma_acc_m": np.ones(9)}, "sigma_acc_m does not fit"),
         ({"elevation_deg": np.ones((1, 1, 10))}, "epochs x satellites"),
         ({"used": np.ones((2, 10), bool)}, "used does not fit"),
+        ({"used": np.full(10, np.nan)}, "booleans"),
+        ({"used": [True, None] * 5}, "booleans"),
+        ({"used": ["True"] * 10}, "booleans"),
+        ({"elevation_deg": [["a"] * 10]}, "elevation_deg must be numbers"),
+        ({"sigma_int_m": "a"}, "sigma_int_m must be numbers"),
     ],
 )
 def test_nonsense_is_refused(change: dict[str, Any], text: str) -> None:

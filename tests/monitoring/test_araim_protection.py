@@ -14,12 +14,8 @@ from hypothesis import strategies as st
 from sbas.exceptions import InputError
 from sbas.monitoring.araim_dual_frequency import dual_frequency_ranges
 from sbas.monitoring.araim_geometry import AraimGeometry
-from sbas.monitoring.araim_protection import (
-    UNMONITORED,
-    AraimResult,
-    araim_levels,
-    araim_modes,
-)
+from sbas.monitoring.araim_protection import araim_levels, araim_modes
+from sbas.monitoring.araim_result import UNMONITORED, AraimResult
 from sbas.monitoring.araim_roots import TOLERANCE_M
 from sbas.monitoring.araim_settings import AraimSettings
 from sbas.monitoring.normal_equations import GeometryReason
@@ -311,6 +307,78 @@ def test_a_fault_is_detected_when_its_separation_passes_the_threshold() -> None:
         assert (r.alarm_ratio > 1).tolist() == [False, detected]
 
 
+# Faults of all ranges at once, kept below every threshold east, north and up by a linear
+# programme: on a track to the north-east the separation is 1.7 times its threshold.
+HIDDEN: dict[str, Any] = {
+    "elevation_deg": [19.6589, 44.5097, 7.5564, 44.2974, 79.7143, 10.3328, 12.431, 47.9727,
+                      74.8986, 46.7293, 77.1427, 28.9039],
+    "azimuth_deg": [356.9582, 76.3291, 278.2764, 120.7734, 300.6366, 12.8178, 112.4202, 332.6021,
+                    278.2647, 174.598, 136.0674, 339.9336],
+    "constellation": np.array(list("GGGGGGEEEEEE")),
+    "sigma_int_m": np.full(12, 1.5),
+    "sigma_acc_m": np.full(12, 1.5),
+    "b_nom_m": 0.5,
+}  # fmt: skip
+HIDDEN_RESIDUAL = [[-100.0, 54.8364, -100.0, 100.0, 3.38217, -84.35351, 100.0, -70.24463,
+                    -19.2749, 67.61929, 37.14311, -100.0]]  # fmt: skip
+
+
+def test_a_track_is_tested_with_the_threshold_that_its_level_contains() -> None:
+    plain = levels(HIDDEN, residual_m=HIDDEN_RESIDUAL)
+    assert plain.alarm_ratio[0] == pytest.approx(0.999, abs=1e-4)
+    assert plain.available[0]
+    table = araim_modes(AraimGeometry(**HIDDEN), heading_deg=45.0, residual_m=HIDDEN_RESIDUAL)
+    along = (table["separation_along_m"].abs() / table["threshold_along_m"]).max()
+    track = levels(HIDDEN, heading_deg=45.0, residual_m=HIDDEN_RESIDUAL)
+    assert along > 1.6
+    assert track.alarm_ratio[0] == pytest.approx(along, rel=1e-12)
+    assert track.detected[0]
+    assert not track.available[0]
+
+
+def test_an_unknown_heading_tests_east_north_and_up_only() -> None:
+    twice = HIDDEN | {
+        name: np.tile(HIDDEN[name], (2, 1)) for name in ("elevation_deg", "azimuth_deg")
+    }
+    residual = np.tile(HIDDEN_RESIDUAL, (2, 1))
+    r = levels(twice, heading_deg=[np.nan, 45.0], residual_m=residual)
+    plain = levels(HIDDEN, residual_m=HIDDEN_RESIDUAL)
+    assert r.alarm_ratio[0] == pytest.approx(plain.alarm_ratio[0], rel=1e-12)
+    assert r.available.tolist() == [True, False]
+
+
+@pytest.mark.parametrize("size", [1e200, 1.7e308])
+def test_residuals_and_biases_beyond_all_sense_pass_nothing(size: float) -> None:
+    given = sky(10, "GGGGGGEEEEEE")
+    residual = np.zeros((1, 12))
+    residual[0, 3:6] = size, -size, size
+    assert not levels(given, residual_m=residual, heading_deg=3.0).available[0]
+    wide = levels(given | {"b_nom_m": size}, residual_m=np.zeros((1, 12)), heading_deg=3.0)
+    assert np.isinf(wide.level_m).all()
+    assert not wide.available[0]
+
+
+def test_accuracies_beyond_all_sense_are_no_sigma() -> None:
+    r = levels(sky(10, "GGGGGGEEEEEE") | {"sigma_acc_m": 1e160})
+    assert r.ranges_left_out == {"no sigma above 0": 12}
+
+
+def test_a_range_without_bound_of_its_bias_says_so() -> None:
+    given = sky(13, "GGGGGGEEEEEE")
+    given["b_nom_m"][0, :2] = np.nan, np.inf
+    r = levels(given)
+    assert r.ranges_left_out == {"no finite bound of its nominal bias": 2}
+    assert r.satellites[0] == 10
+
+
+def test_an_sbas_satellite_has_the_clock_of_gps() -> None:
+    given = sky(13, "GGGGGGEEEEES")
+    r = levels(given)
+    assert (r.satellites[0], r.ranges_left_out) == (12, {})
+    as_gps = given | {"constellation": np.array(list("GGGGGGEEEEEG"))}
+    assert r.level_m == pytest.approx(levels(as_gps).level_m, rel=1e-12)
+
+
 def test_an_error_of_a_whole_constellation_is_its_clock() -> None:
     given = sky(10, "GGGGGGEEEEEE")
     shift = np.where(given["constellation"] == "E", 1000.0, 0.0)[None]
@@ -408,7 +476,7 @@ def test_a_critical_satellite_counts_as_unmonitored() -> None:
 def test_no_vertical_budget_no_vertical_level() -> None:
     r = levels(appendix_d(), settings=AraimSettings(phmi_v=0.0, phmi_h=1e-7))
     assert np.isinf(r.vpl_m[0])
-    assert r.available[0]
+    assert r.has_level[0]
     assert r.hpl_m[0] < 14.4
 
 
@@ -433,6 +501,12 @@ def test_shapes_and_priors_that_do_not_fit_are_refused() -> None:
         levels(given, heading_deg=[1.0, 2.0, 3.0])
     with pytest.raises(InputError, match="residual_m does not fit"):
         levels(given, residual_m=np.zeros((2, 11)))
+    with pytest.raises(InputError, match="residual_m must be numbers"):
+        levels(given, residual_m="a")
+    for epoch in (2, -3, 1.0, "a", True):
+        with pytest.raises(InputError, match="no epoch"):
+            araim_modes(AraimGeometry(**given), epoch)  # type: ignore[arg-type]
+    assert araim_modes(AraimGeometry(**given), -1).equals(araim_modes(AraimGeometry(**given), 1))
     with pytest.raises(InputError, match="no p_satellite for constellation E"):
         levels(given, settings=AraimSettings(p_satellite={"G": 1e-5}))
 
@@ -447,4 +521,4 @@ def test_summary_and_modes_of_dual_frequency_ranges() -> None:
     assert r.vpl_m[0] < levels(example).vpl_m[0]
     frame = r.summary()
     assert frame.loc[0, "hpl_m"] == r.hpl_m[0]
-    assert frame.loc[0, "reason"] == ""
+    assert frame.loc[0, "reason"].startswith("no test ran")

@@ -139,6 +139,18 @@ def test_rows_do_not_depend_on_each_other_but_for_the_tolerance() -> None:
         assert alone[0] == pytest.approx(together[row], abs=TOLERANCE_M)
 
 
+@pytest.mark.parametrize("bias", [1e9, 1e11, 1e13, 1e300, np.inf])
+def test_biases_beyond_all_sense_are_bounded_or_have_no_level(bias: float) -> None:
+    budget, sigma_0, bias_0, prior, offset, sigma = draw(8)
+    found = level_of_risk(budget, sigma_0, bias_0, prior, offset + bias, sigma)
+    # A mode rarer than the budget may be left out of the level; the others contain the bias.
+    large = (prior > budget).any(axis=0)
+    assert large.any()
+    assert (found[large] > bias if bias < 1e12 else np.isinf(found[large])).all()
+    plain = level_of_risk(budget, sigma_0, bias_0 + bias, np.zeros_like(prior), offset, sigma)
+    assert (plain >= bias if bias < 1e12 else np.isinf(plain)).all()
+
+
 def test_huge_lengths_end_as_well() -> None:
     budget, sigma_0, bias_0, prior, offset, sigma = draw(7)
     found = level_of_risk(budget, 1e9 * sigma_0, bias_0, prior, 1e9 * offset, 1e9 * sigma)

@@ -53,6 +53,22 @@ def test_impossible_settings_are_refused(wrong: dict[str, Any]) -> None:
         AraimSettings(**wrong)
 
 
+PROBABILITIES = ("p_satellite", "p_constellation", "phmi_v", "phmi_h", "pfa_v", "pfa_h", "p_thres",
+                 "p_emt")  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PROBABILITIES)
+@pytest.mark.parametrize("value", ["a", None, [1e-5], True, {"G": "a"}], ids=str)
+def test_what_is_no_number_is_refused(name: str, value: Any) -> None:
+    with pytest.raises(InputError, match=name):
+        AraimSettings(**{name: value})
+
+
+def test_sbas_satellites_have_no_priors_of_their_own() -> None:
+    with pytest.raises(InputError, match="priors of GPS"):
+        AraimSettings(p_satellite={"G": 1e-5, "S": 1e-3})
+
+
 def test_values_by_constellation() -> None:
     assert by_constellation("x", 0.5, ("G", "E")).tolist() == [0.5, 0.5]
     assert by_constellation("x", {"E": 1, "G": 2, "R": 3}, ("G", "E")).tolist() == [2.0, 1.0]

@@ -3,13 +3,16 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import norm
 
 from sbas.exceptions import InputError
 from sbas.monitoring.level_comparison import hpl_risk, raim_against_sbas
 from sbas.monitoring.recording_monitor import raim
-from tests.monitoring.recordings import noisy, recording_of
+from sbas.recording import Flag, Recording
+from tests.monitoring.recordings import START, noisy, recording_of
+from tests.monitoring.skies import CASES
 
 
 def test_the_risk_of_the_published_factors() -> None:
@@ -49,6 +52,7 @@ def test_the_level_like_the_hpl_has_its_risk() -> None:
     recording = noisy(2, 8, 10, hpl_m=20.0)
     found = raim_against_sbas(recording)
     assert found.risk == pytest.approx(np.exp(-(6.18**2) / 2), rel=1e-12)
+    assert found.risk is not None
     own = raim(recording, risk=found.risk).epochs["hpl_separation_m"].to_numpy()
     assert found.levels["like_hpl_m"].to_numpy() == pytest.approx(own, rel=1e-12)
     assert (found.levels["like_hpl_m"] > found.levels["sigma_major_m"] * 5).all()
@@ -85,3 +89,85 @@ def test_what_cannot_be_compared_is_refused() -> None:
         raim_against_sbas(noisy(1, 6, 2))
     with pytest.raises(InputError, match="alert limit"):
         raim_against_sbas(noisy(1, 6, 2, hpl_m=1.0), alert_limit_m=0.0)
+
+
+def test_ratios_are_of_levels_that_are_finite_and_above_zero() -> None:
+    hpl = np.array([10.0, np.inf, 0.0, -5.0, np.nan, 20.0])
+    found = raim_against_sbas(noisy(1, 8, 6, hpl_m=hpl))
+    herl = found.levels["herl_m"].to_numpy()
+    assert found.ratio("herl_m") == pytest.approx([herl[0] / 10, herl[5] / 20], rel=1e-12)
+    assert found.to_dict()["over_hpl"]["herl"]["epochs"] == 2
+    # A level of 0 or below protects nobody.
+    assert found.both.sum(axis=1).tolist() == [4, 2]
+
+
+def test_the_findings_of_raim_are_part_of_the_answer() -> None:
+    recording = noisy(1, 8, 50, hpl_m=12.0)
+    side = recording.side_tables["satellites"]
+    side = side.assign(sigma_m=100 * side["sigma_m"])
+    found = raim_against_sbas(recording.replace(side_tables={"satellites": side}))
+    assert "E08" in [finding["code"] for finding in found.to_dict()["findings"]]
+
+
+def test_a_fault_that_would_not_show_makes_herl_infinite_not_absent() -> None:
+    """Case A, whose satellite in the zenith is replaced by one that alone holds the east."""
+    azimuth = np.array([0.0, 0.0, 180.0, 180.0, 90.0])[:, None]
+    elevation = np.array([20.0, 60.0, 20.0, 60.0, 10.0])[:, None]
+    found = raim_against_sbas(recording_of(elevation, azimuth, 1.0, np.zeros((5, 1)), hpl_m=9.0))
+    assert found.raim.available == 0
+    assert found.levels["herl_m"].tolist() == [np.inf]
+    assert found.ratio("herl_m").size == 0
+
+
+def test_ranges_that_are_not_known_have_a_line_of_their_own() -> None:
+    recording = noisy(1, 8, 10, hpl_m=12.0)
+    side = recording.side_tables["satellites"].copy()
+    side.loc[side["time"] == recording.time[3], "azimuth_deg"] = np.nan
+    found = raim_against_sbas(recording.replace(side_tables={"satellites": side}))
+    assert found.by_satellites["epochs"].to_dict() == {-1: 1, 8: 9}
+    assert found.to_dict()["by_satellites"]["unknown"]["fix"] == 0
+
+
+def test_an_exclusion_leaves_an_epoch_under_the_number_of_all_its_ranges() -> None:
+    azimuth, elevation = (np.repeat(np.array(v, float)[:, None], 3, 1) for v in CASES["B"])
+    # A seventh satellite lets the fault of the first be told apart.
+    azimuth, elevation = (
+        np.vstack([values, np.full((1, 3), one)])
+        for values, one in ((azimuth, 30.0), (elevation, 35.0))
+    )
+    y = np.zeros((7, 3))
+    y[0] = 60.0
+    found = raim_against_sbas(recording_of(elevation, azimuth, 1.0, y, hpl_m=12.0))
+    assert found.raim.excluded == 3
+    assert found.by_satellites["identifies"].to_dict() == {7: 3}
+
+
+def logged() -> Recording:
+    """Three epochs of a receiver whose HERL lies above the alert limit of the tests."""
+    index = pd.DatetimeIndex(START + np.arange(3) * np.timedelta64(1, "s"), name="time")
+    flags = np.array([Flag.RAIM_PASSED, Flag.RAIM_FAILED, Flag.RAIM_PASSED], "u4")
+    return Recording(
+        pd.DataFrame({"flags": flags, "herl_m": 60.0, "hpl_m": [20.0, 20.0, 50.0]}, index=index)
+    )
+
+
+def test_raim_without_a_level_of_its_own_is_available_by_its_verdict() -> None:
+    found = raim_against_sbas(logged(), alert_limit_m=25.0)
+    assert found.both.tolist() == [[0, 1], [1, 1]]
+    assert "verdict" in found.to_dict()["raim_available_where"]
+    assert "below 25 m" in raim_against_sbas(noisy(1, 8, 3, hpl_m=1.0), alert_limit_m=25).raim_words
+
+
+def test_settings_of_ranges_are_refused_for_a_receivers_own_herl() -> None:
+    for settings in ({"risk": 1e-7}, {"prior": 1e-4}, {"false_alarm": 1e-2}, {"sigma": 1.0},
+                     {"outlier_alarm": 1e-3}, {"elevation_mask_deg": 5.0}):  # fmt: skip
+        with pytest.raises(InputError):
+            raim_against_sbas(logged(), **settings)
+
+
+def test_a_mask_takes_part_in_the_comparison() -> None:
+    recording = noisy(2, 9, 5, hpl_m=12.0)
+    masked = raim_against_sbas(recording, elevation_mask_deg=25.0)
+    own = raim(recording, elevation_mask_deg=25.0).epochs
+    assert masked.levels["n_sv"].tolist() == own["n_sv"].tolist()
+    assert masked.levels["n_sv"].max() < 9

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from typing import Any
+
+import mpmath as mp
 import numpy as np
 import pytest
 from hypothesis import given
@@ -140,6 +143,39 @@ def test_a_variance_along_an_axis_is_that_of_the_rotated_matrix() -> None:
     whole = np.array([[4, 1, 0.5], [1, 9, -0.3], [0.5, -0.3, 16]])
     axis = np.array([0.6, 0.8, 0.0])
     assert variance(covariance, axis)[0] == pytest.approx(axis @ whole @ axis, rel=1e-14)
+
+
+def exact_redundancies(elevation: Any, azimuth: Any, sigma: Any, clock: Any) -> list[float]:
+    """1 - w_i g_i' P g_i at 40 digits."""
+    with mp.workdps(40):
+        design = mp.matrix(design_of(elevation, azimuth, clock).tolist())
+        weight = mp.diag([1 / mp.mpf(float(s)) ** 2 for s in sigma])
+        hat = design * (design.T * weight * design) ** -1 * design.T * weight
+        return [float(1 - hat[i, i]) for i in range(len(sigma))]
+
+
+def test_small_redundancies_keep_their_digits() -> None:
+    # Four ranges far better than the others: 1 - leverage would lose up to nine digits.
+    rng = np.random.default_rng(11)
+    least = 1.0
+    for clocks in (1, 2) * 6:
+        elevation, azimuth, sigma = random_sky(rng, 9, 1)
+        sigma[:4] *= 0.002
+        clock = np.arange(9)[:, None] % clocks
+        g = geometry(ranges(elevation, azimuth, sigma, clock=clock))
+        exact = exact_redundancies(elevation[:, 0], azimuth[:, 0], sigma[:, 0], clock[:, 0])
+        assert g.redundancy[:, 0] == pytest.approx(exact, rel=1e-9, abs=0)
+        least = min(least, *exact)
+    assert least < 1e-6
+
+
+def test_ranges_beyond_all_sense_have_no_finite_statistic() -> None:
+    elevation, azimuth, sigma = random_sky(np.random.default_rng(2), 8, 2)
+    y = np.zeros((8, 2))
+    y[3] = 1e200, 1.7e308
+    y[4, 1] = -1.7e308
+    found = adjust(geometry(ranges(elevation, azimuth, sigma, residual_m=y)), y)
+    assert not np.isfinite(found.statistic).any()
 
 
 def test_a_badly_conditioned_fix_trusts_no_redundancy_that_is_rounding() -> None:

@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pandas as pd
 import pytest
 
 from sbas.exceptions import InputError
@@ -112,6 +115,92 @@ def test_what_cannot_be_right_is_refused() -> None:
         recorded_ranges(recording.replace(side_tables={}))
     with pytest.raises(InputError, match="sigma"):
         recorded_ranges(recording, sigma=0.0)
+
+
+def with_column(recording: Recording, name: str, values: object) -> Recording:
+    side = recording.side_tables[SIDE_TABLE].copy()
+    side[name] = values
+    return recording.replace(side_tables={SIDE_TABLE: side})
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        (np.nan, "float64"),
+        (1, "int64"),
+        ("True", "booleans"),
+        (pd.array([True, pd.NA] * 12, dtype="boolean"), "12 rows of 24"),
+        (pd.Categorical([True, False] * 12), "category"),
+    ],
+    ids=["float", "int", "text", "unknown", "category"],
+)
+def test_used_is_a_boolean(values: object, text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        recorded_ranges(with_column(noisy(1, 6, 4), "used", values))
+
+
+def test_booleans_that_could_be_unknown_and_are_not_are_booleans() -> None:
+    plain = noisy(1, 6, 4)
+    nullable = with_column(plain, "used", pd.array([True, False] * 12, dtype="boolean"))
+    assert recorded_ranges(nullable).used.sum() == 12
+
+
+@pytest.mark.parametrize("name", ["elevation_deg", "azimuth_deg", "sigma_m", "residual_m"])
+def test_values_are_numbers(name: str) -> None:
+    with pytest.raises(InputError, match=name):
+        recorded_ranges(with_column(noisy(1, 6, 4), name, "1.5"))
+    missing = pd.array([pd.NA, *[40.0] * 23], dtype="Float64")
+    found = recorded_ranges(with_column(noisy(1, 6, 4), name, missing))
+    assert (found.reason == MonitorReason.INCOMPLETE).sum() == 1
+
+
+def test_times_are_dates() -> None:
+    with pytest.raises(InputError, match="dates"):
+        recorded_ranges(with_column(noisy(1, 6, 4), "time", "2024-03-05"))
+
+
+def test_no_epochs_with_satellites_are_no_ranges() -> None:
+    recording = edited(noisy(1, 6, 4), 2, sigma_m=np.nan)
+    found = recorded_ranges(recording.replace(table=recording.table[:0]))
+    assert found.reason.size == 0
+    assert "24 rows of 24" in found.findings[0].evidence
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0])
+def test_a_sigma_of_0_or_less_is_refused_with_its_count(wrong: float) -> None:
+    recording = edited(noisy(1, 6, 4), 2, sigma_m=wrong)
+    with pytest.raises(InputError, match="1 of 24 ranges"):
+        recorded_ranges(recording)
+    assert recorded_ranges(recording, sigma=2.0).used.all()
+    assert (recorded_ranges(edited(recording, 2, used=False)).reason == 0).all()
+
+
+@pytest.mark.parametrize("mask", [np.nan, -20.0, 90.5, 500.0, "5", True])
+def test_a_mask_is_an_elevation(mask: float) -> None:
+    with pytest.raises(InputError, match="elevation mask"):
+        recorded_ranges(noisy(1, 6, 4), elevation_mask_deg=mask)
+
+
+@pytest.mark.parametrize(
+    "sigma", [[1, 2], "a", (1.0, 2.0, 3.0), (1.0,), np.nan, -1.0, True, (1, "a")], ids=str
+)
+def test_a_sigma_is_one_number_or_two(sigma: Any) -> None:
+    with pytest.raises(InputError, match="sigma needs"):
+        recorded_ranges(noisy(1, 6, 4), sigma=sigma)
+
+
+def test_radians_are_refused_from_one_epoch_on() -> None:
+    recording = noisy(1, 6, 1)
+    radians = np.deg2rad(recording.side_tables[SIDE_TABLE]["elevation_deg"])
+    with pytest.raises(InputError, match="radians"):
+        recorded_ranges(with_column(recording, "elevation_deg", radians))
+
+
+def test_cures_name_the_argument() -> None:
+    with pytest.raises(InputError) as caught:
+        recorded_ranges(noisy(1, 6, 1).replace(side_tables={}))
+    assert "sigma=" in caught.value.cure
+    assert "sigma=" in recorded_ranges(noisy(1, 6, 2), sigma=400.0).findings[0].cure
 
 
 def test_variances_for_sigmas_are_noticed() -> None:

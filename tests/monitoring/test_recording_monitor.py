@@ -1,14 +1,16 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
 from sbas.exceptions import InputError
+from sbas.monitoring.receiver_flags import with_raim_flags
 from sbas.monitoring.recording_monitor import raim
-from sbas.monitoring.verdicts import Verdict
+from sbas.monitoring.verdicts import MonitorReason, Verdict
 from sbas.satellite_table import SIDE_TABLE
 from tests.monitoring.recordings import noisy, recording_of
 from tests.monitoring.skies import CASES, design_of, random_sky, refit
@@ -41,7 +43,9 @@ def test_a_fault_is_named_and_its_epochs_are_runs() -> None:
     assert result.detected == 10
     assert result.alarm_runs == 1
     assert result.excluded == 10
-    assert (rows["n_sv"] == 8).all()
+    assert (rows["n_sv"] == 9).all()
+    assert (rows["n_sv_left"] == 8).all()
+    assert (result.epochs["n_sv_left"].iloc[:10] == 9).all()
     plain = result.to_dict()
     assert plain["detected"] == 10
     assert plain["available"] == 60
@@ -120,3 +124,66 @@ def test_an_empty_recording_has_no_epoch() -> None:
     side = recording.side_tables[SIDE_TABLE][:0]
     empty = recording.replace(table=recording.table[:0], side_tables={SIDE_TABLE: side})
     assert raim(empty).to_dict()["epochs"] == 0
+
+
+def test_an_excluded_epoch_keeps_the_test_of_all_its_ranges() -> None:
+    """Case C of the methods page with 10 m on satellite 1: T 35.457358, three degrees."""
+    azimuth, elevation = (np.repeat(np.array(v, float)[:, None], 3, 1) for v in CASES["C"])
+    y = np.zeros((7, 3))
+    y[0] = 10.0
+    result = raim(recording_of(elevation, azimuth, 1.0, y), outlier_alarm=1e-3)
+    epochs = result.epochs
+    assert result.excluded == 3
+    assert epochs["statistic"].to_numpy() == pytest.approx(35.45735832, abs=5e-8)
+    assert epochs["dof"].tolist() == [3, 3, 3]
+    assert epochs["threshold"].to_numpy() == pytest.approx(chi2.isf(1e-3, 3), rel=1e-10)
+    assert epochs["n_sv"].tolist() == [7, 7, 7]
+    assert epochs["n_sv_left"].tolist() == [6, 6, 6]
+    assert result.variance_factor == pytest.approx(35.45735832 / chi2.median(3), rel=1e-8)
+    left = recording_of(elevation[1:], azimuth[1:], 1.0, y[1:])
+    assert epochs["herl_m"].to_numpy() == pytest.approx(
+        raim(left, outlier_alarm=1e-3).epochs["herl_m"].to_numpy(), rel=1e-9
+    )
+
+
+def test_ranges_that_are_not_those_of_the_fix_have_no_number() -> None:
+    recording = noisy(3, 8, 4)
+    side = recording.side_tables[SIDE_TABLE].copy()
+    side.loc[(side["satellite"] == "G03") & (side["time"] == recording.time[1]), "sigma_m"] = np.nan
+    side = side[side["time"] != recording.time[2]]
+    epochs = raim(recording.replace(side_tables={SIDE_TABLE: side})).epochs
+    assert epochs["n_sv"].tolist() == [8, -1, 0, 8]
+    assert epochs["reason"].iloc[1] == MonitorReason.INCOMPLETE.words
+
+
+@pytest.mark.parametrize("mask", [float("nan"), -20.0, 90.0, 500.0, "5"])
+def test_a_mask_that_is_none_is_refused(mask: Any) -> None:
+    with pytest.raises(InputError, match="elevation mask"):
+        raim(noisy(7, 8, 5), elevation_mask_deg=mask)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"track_azimuth_deg": 361.0}, {"track_azimuth_deg": -1e9}, {"track_azimuth_deg": "north"},
+        {"exclusions": True}, {"exclusions": 1.0}, {"exclusions": 3}, {"false_alarm": "x"},
+        {"missed_detection": True}, {"outlier_alarm": None}, {"risk": "1e-7"}, {"prior": [1e-5]},
+    ],
+)  # fmt: skip
+def test_settings_of_another_kind_are_refused(settings: dict[str, Any]) -> None:
+    with pytest.raises(InputError):
+        raim(noisy(1, 6, 2), **settings)
+
+
+def test_settings_are_part_of_the_result() -> None:
+    result = raim(noisy(7, 8, 5), sigma=(1.0, 2.0), elevation_mask_deg=0)
+    assert (result.sigma, result.elevation_mask_deg) == ((1.0, 2.0), 0)
+    assert result.to_dict()["elevation_mask_deg"] == 0
+
+
+def test_ranges_without_sigma_give_way_to_the_recordings_own_raim() -> None:
+    recording = noisy(7, 8, 5)
+    side = recording.side_tables[SIDE_TABLE].drop(columns="sigma_m")
+    both = with_raim_flags(recording, raim(recording)).replace(side_tables={SIDE_TABLE: side})
+    assert raim(both).source == "written"
+    assert raim(both, sigma=2.0).source == "ranges"

@@ -53,7 +53,10 @@ def synthetic_recording(
 
 @cache
 def evaluated(kind: str) -> Evaluation:
-    """An evaluation of a recording of the named kind; the names are in `KINDS`."""
+    """An evaluation of a recording of the named kind; the names are in `KINDS`.
+
+    From 1000 epochs on records are simulated for the interval of tau: only "ordinary" has it.
+    """
     return KINDS[kind]()
 
 
@@ -65,27 +68,27 @@ def _ordinary() -> Evaluation:
 
 
 def _moving_without_truth() -> Evaluation:
-    recording = synthetic_recording()
+    recording = synthetic_recording(500)
     drift = np.linspace(0, 0.1, len(recording))
     return evaluate(_with(recording, lat_deg=recording.table["lat_deg"] + drift))
 
 
 def _bare() -> Evaluation:
     """Positions alone: no level, no satellites, no DOP, no sigma."""
-    recording = synthetic_recording()
+    recording = synthetic_recording(500)
     return evaluate(
         recording.replace(table=recording.table[["lat_deg", "lon_deg", "height_m"]]), truth=TRUTH
     )
 
 
 def _nothing_known() -> Evaluation:
-    recording = synthetic_recording()
+    recording = synthetic_recording(500)
     return evaluate(recording.replace(table=recording.table[[]]), truth=TRUTH)
 
 
 KINDS = {
     "ordinary": _ordinary,
-    "own_median": lambda: evaluate(synthetic_recording()),
+    "own_median": lambda: evaluate(synthetic_recording(500)),
     "moving_without_truth": _moving_without_truth,
     "without_levels": _bare,
     "nothing_known": _nothing_known,

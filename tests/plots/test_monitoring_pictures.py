@@ -56,6 +56,23 @@ def receivers_own() -> Recording:
     return Recording(table)
 
 
+def hidden() -> Recording:
+    """Four epochs, at the last two a satellite alone holds the east: its fault would not show."""
+    azimuth = np.repeat([[0.0], [0.0], [180.0], [180.0], [90.0], [270.0]], 4, 1)
+    elevation = np.repeat([[20.0], [60.0], [20.0], [60.0], [10.0], [15.0]], 4, 1)
+    elevation[5, 2:] = np.nan
+    return recording_of(elevation, azimuth, 1.0, np.zeros((6, 4)), hpl_m=15.0)
+
+
+def unknown() -> Recording:
+    """Ten epochs with eight ranges, one of them without azimuth at the first two."""
+    recording = noisy(1, 8, 10, hpl_m=12.0)
+    side = recording.side_tables["satellites"].copy()
+    rows = (side["satellite"] == "G02") & (side["time"] < recording.time[2])
+    side.loc[rows, "azimuth_deg"] = np.nan
+    return recording.replace(side_tables={"satellites": side})
+
+
 def recordings() -> dict[str, Recording]:
     usual = shrinking()
     first = noisy(1, 8, 1, hpl_m=10.0)
@@ -68,11 +85,16 @@ def recordings() -> dict[str, Recording]:
         "equal times": usual.replace(table=usual.table.set_axis(usual.table.index[[7] * 40])),
         "many numbers of satellites": growing(),
         "the receiver's own": receivers_own(),
+        "levels of 0 and infinity": noisy(1, 8, 4, hpl_m=[0.0, -1.0, np.inf, 12.0]),
+        "no level above 0": noisy(1, 8, 4, hpl_m=[0.0, -1.0, np.inf, np.inf]),
+        "a fault that would not show": hidden(),
+        "ranges not known": unknown(),
     }
 
 
 def compared(kind: str) -> LevelComparison:
-    return raim_against_sbas(recordings()[kind], risk=5e-9)
+    given = recordings()[kind]
+    return raim_against_sbas(given, risk=None if "herl_m" in given.columns else 5e-9)
 
 
 def drawn(name: str, result: Any, figure: Figure | None) -> Any:
@@ -140,7 +162,7 @@ def test_levels_are_drawn_and_what_is_not_available_is_a_gap_with_a_bar() -> Non
 
 def test_a_receivers_own_probabilities_are_not_made_up() -> None:
     upper, _ = sbas.plots.raim_levels(compared("the receiver's own"))
-    assert any("the receiver's: 1 of 3 epochs" in text for text in legend(upper))
+    assert any("beta not stated: 1 of 3 epochs" in text for text in legend(upper))
     ax = sbas.plots.raim_availability(compared("the receiver's own"))
     assert [t.get_text().split() for t in ax.get_xticklabels()] == [["unknown", "3"], ["all", "3"]]
     assert legend(ax) == ["RAIM available: 1"]
@@ -208,12 +230,13 @@ def test_the_outcomes_of_each_fault_fill_its_bar() -> None:
     order = result.table.iloc[[0, 1, 4, 5, 2, 3]]
     assert order["kind"].tolist() == ["step", "step", "two", "two", "ramp", "ramp"]
     for name, column in (
-        ("found, right range excluded", "excluded_right"), ("missed", "missed"),
-        ("found, wrong range excluded", "excluded_wrong"), ("no test", "unavailable"),
+        ("found, all faults excluded", "excluded_right"), ("missed", "missed"),
+        ("one fault excluded, one left in", "excluded_part"),
+        ("good range excluded", "excluded_good"), ("no test", "unavailable"),
     ):  # fmt: skip
         np.testing.assert_allclose(heights[name], 100 * order[column] / order["trials"])
-    found = heights["found, not excluded"] + heights["found, right range excluded"]
-    found += heights["found, wrong range excluded"]
+    found = heights["found, nothing excluded"] + heights["found, all faults excluded"]
+    found += heights["one fault excluded, one left in"] + heights["good range excluded"]
     np.testing.assert_allclose(found, 100 * order["detected"] / order["trials"])
     assert [t.get_text() for t in ax.get_xticklabels()] == ["1", "50", "1", "50", "0.5", "5"]
     for text in ("one step [m]", "two steps at once [m]", "one ramp [m/s]"):
@@ -232,3 +255,30 @@ def test_the_outcomes_of_each_fault_fill_its_bar() -> None:
 )
 def test_what_cannot_be_drawn_is_said(name: str, kind: str, said: str) -> None:
     assert said in words(*np.atleast_1d(drawn(name, compared(kind), None)))
+
+
+def test_an_infinite_herl_has_a_bar_at_the_head() -> None:
+    result = compared("a fault that would not show")
+    assert np.isinf(result.levels["herl_m"]).tolist() == [False, False, True, True]
+    upper, _ = sbas.plots.raim_levels(result)
+    heads = [
+        path.vertices for c in upper.collections for path in c.get_paths()
+        if path.vertices[:, 1].min() > 0.9
+    ]  # fmt: skip
+    assert min(v[:, 0].min() for v in heads) == pytest.approx(1.5, abs=1e-6)
+    assert any("infinite at 2" in text for text in legend(upper))
+    assert "HERL infinite (2)" in words(upper)
+
+
+def test_ranges_that_are_not_known_are_not_no_satellites() -> None:
+    ax = sbas.plots.raim_availability(compared("ranges not known"))
+    assert [t.get_text().split() for t in ax.get_xticklabels()] == [
+        ["unknown", "2"], ["8", "8"], ["all", "10"],
+    ]  # fmt: skip
+    assert any(text.startswith("no fix, or not known: 2") for text in legend(ax))
+
+
+def test_a_receivers_own_raim_counts_by_its_verdict() -> None:
+    assert "RAIM (its verdict)" in words(
+        sbas.plots.raim_availability(compared("the receiver's own"))
+    )

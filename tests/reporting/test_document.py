@@ -7,6 +7,7 @@ import importlib
 import json
 import re
 from decimal import ROUND_CEILING, Decimal
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,14 @@ from sbas.integrity.evaluation import evaluate
 from sbas.integrity.results import Evaluation
 from sbas.integrity.tails.tail_fit import TailFit
 from sbas.reporting import render_html, report, report_of
-from sbas.reporting.sections import event_list
+from sbas.reporting.document import Report
+from sbas.reporting.sections import (
+    decorrelation_and_k,
+    error_tail,
+    event_list,
+    results,
+    verdict,
+)
 from sbas.reporting.sections.method_trace import METHODS
 from tests.plots.synthetic import KINDS, TRUTH, evaluated, synthetic_recording
 
@@ -65,6 +73,12 @@ class _Page(HTMLParser):
 
 def _words(page: str) -> str:
     return " ".join(_Page(page).text.split())
+
+
+@cache
+def document(kind: str) -> Report:
+    """The report of `evaluated(kind)`, drawn once."""
+    return report_of(evaluated(kind))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -122,7 +136,7 @@ def _with_rates(evaluation: Evaluation, hours: float, only: float | None = None)
 
 
 def _verdict(evaluation: Evaluation) -> tuple[str, str]:
-    first = report_of(evaluation).sections[0].callouts[0]
+    first = verdict.section(evaluation).callouts[0]
     return first.title, " ".join(first.paragraphs)
 
 
@@ -168,17 +182,17 @@ def test_a_bound_on_the_claim_itself_is_not_demonstrated() -> None:
 
 
 def test_a_lower_bound_is_said_and_no_rate_is_given() -> None:
-    document = report_of(evaluated("own_median"))
-    titles = [callout.title for callout in document.sections[0].callouts]
+    found = document("own_median")
+    titles = [callout.title for callout in found.sections[0].callouts]
     assert titles[0].startswith("NOT DEMONSTRATED")
     assert "Errors are a lower bound" in titles
-    words = _words(render_html(document))
+    words = _words(render_html(found))
     assert "only a lower bound" in words
     assert isinstance(evaluated("own_median").alert_limits[0].rates["hmi"].demonstrated, Refusal)
 
 
 def test_without_truth_no_error_figure_is_printed() -> None:
-    words = _words(render_html(report_of(evaluated("moving_without_truth"))))
+    words = _words(render_html(document("moving_without_truth")))
     assert "There is no truth for this recording" in words
     assert "HPE 95 %" not in words
 
@@ -199,28 +213,28 @@ def test_every_traced_function_exists_and_is_documented(method: Any) -> None:
 
 
 def test_first_50_events_are_listed_and_the_rest_counted() -> None:
-    """63 epochs, each 70 s apart, put 100 m beside the truth."""
+    """63 epochs, each 70 s apart, put 100 m beside the truth; an epoch is 10 s."""
     recording = synthetic_recording(70 * 63)
-    table = recording.table.copy()
-    table.iloc[::70, table.columns.get_loc("lat_deg")] += 100 / 111_200
+    table = recording.table.iloc[::10].copy()
+    table.iloc[::7, table.columns.get_loc("lat_deg")] += 100 / 111_200
     evaluation = evaluate(recording.replace(table=table), truth=TRUTH)
     tables = {t.title: t for t in event_list.section(evaluation).tables}
     shown = tables["HPE ≥ AL at an alert limit of 50 m: 63"]
     assert len(shown.rows) == 50
     assert shown.notes == ("13 more are counted but not listed.",)
     assert shown.rows[1][1].text == "2009-09-19 00:01:10"
-    assert shown.rows[1][2].text == "1"
+    assert shown.rows[1][2].text == "10"
 
 
 def test_the_same_object_gives_json() -> None:
-    plain = report_of(evaluated("ordinary")).to_dict()
+    plain = document("ordinary").to_dict()
     text = json.dumps(plain, allow_nan=False)
     assert "<svg" not in text
     assert [s["key"] for s in plain["sections"]][:2] == ["verdict", "figures"]
 
 
 def test_inputs_name_digest_and_size() -> None:
-    words = _words(render_html(report_of(evaluated("ordinary"))))
+    words = _words(render_html(document("ordinary")))
     assert "ab" * 32 in words
     assert "300,000" in words
 
@@ -230,15 +244,15 @@ def test_a_folder_that_is_not_there_is_bad_input(tmp_path: Path) -> None:
         report(evaluated("two_epochs"), tmp_path / "absent" / "report.html")
 
 
-def _section(document: Any, key: str) -> Any:
-    return next(s for s in document.sections if s.key == key)
+def _section(report: Report, key: str) -> Any:
+    return next(s for s in report.sections if s.key == key)
 
 
 def test_the_verdict_on_the_published_k_is_that_of_the_evaluation() -> None:
-    evaluation = evaluate(synthetic_recording(60_000), truth=TRUTH)
+    evaluation = evaluate(synthetic_recording(40_000), truth=TRUTH)
     judged = evaluation.railway
     assert not isinstance(judged, Refusal)
-    section = _section(report_of(evaluation), "decorrelation")
+    section = decorrelation_and_k.section(evaluation)
     said = " ".join(section.callouts[0].paragraphs)
     assert judged.as_claimed.verdict in said
     assert evaluation.process.decorrelation.interval_text in said
@@ -251,15 +265,15 @@ def test_the_verdict_on_the_published_k_is_that_of_the_evaluation() -> None:
 
 
 def test_a_short_record_says_that_it_cannot_tell() -> None:
-    section = _section(report_of(evaluated("ordinary")), "decorrelation")
+    section = _section(document("ordinary"), "decorrelation")
     said = " ".join(section.callouts[0].paragraphs)
     assert "too short to confirm or reject 360 s" in said
     assert "cannot be told" in said
 
 
 def test_modelled_rates_and_their_bounds_are_printed_or_refused_in_words() -> None:
-    evaluation = evaluate(synthetic_recording(60_000), truth=TRUTH, alert_limits_m=(10.0,))
-    (rates,) = (t for t in _section(report_of(evaluation), "figures").tables if "Rates" in t.title)
+    evaluation = evaluate(synthetic_recording(40_000), truth=TRUTH, alert_limits_m=(10.0,))
+    (rates,) = (t for t in results.section(evaluation).tables if "Rates" in t.title)
     upper = [c.title for c in rates.columns].index("Modelled: upper bound at 95 % [1/h]")
     kinds = {row[1].text: row[upper].text for row in rates.rows}
     modelled = evaluation.at(10.0).rates["exceeds_al"].modelled
@@ -268,7 +282,7 @@ def test_modelled_rates_and_their_bounds_are_printed_or_refused_in_words() -> No
         assert any(modelled.reason in note for note in rates.notes)
     else:
         assert kinds["HPE ≥ AL"] != "not given"
-    tail = _section(report_of(evaluation), "tail")
+    tail = error_tail.section(evaluation)
     fitted = evaluation.process.tail
     refusal = fitted if isinstance(fitted, Refusal) else fitted.refusal
     assert (tail.callouts[0].title == "No rate is modelled") == (refusal is not None)
@@ -278,11 +292,10 @@ def test_likely_causes_are_listed_the_worst_first() -> None:
     recording = synthetic_recording(spikes={1500: 100.0, 2000: 60.0})
     causes = sbas.explain(recording, truth=TRUTH)
     assert len(causes.events) == 2
-    document = report_of(evaluate(recording, truth=TRUTH), causes=causes)
-    section = _section(document, "causes")
+    section = _section(report_of(evaluated("ordinary"), causes=causes), "causes")
     counts, events = section.tables
     assert sum(int(row[2].text) for row in counts.rows) == 2
     ratios = [float(row[4].text) for row in events.rows]
     assert ratios == sorted(ratios, reverse=True)
-    alone = _section(report_of(evaluated("ordinary")), "causes")
+    alone = _section(document("ordinary"), "causes")
     assert "Not explained" in alone.paragraphs[0]

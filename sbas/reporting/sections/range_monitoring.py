@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from sbas.estimate import Refusal
 from sbas.monitoring.level_comparison import LevelComparison
+from sbas.monitoring.raim_result import SOURCE_WORDS, level_quantile, spread_of
 from sbas.monitoring.verdicts import Verdict
 from sbas.numerals import count, metres, share
 from sbas.plots import raim_availability_picture, raim_levels_picture
-from sbas.reporting.content import Callout, Cell, Section, Table, table
+from sbas.reporting.content import Callout, Cell, Section, Table, Tone, table
 from sbas.reporting.drawn import drawn
 
+_TONES: dict[str, Tone] = {"error": "bad", "warning": "warning", "info": ""}
 _LEVELS = {
     "hpl_m": "SBAS HPL",
     "herl_m": "HERL: effect of the smallest detectable error, no bound",
@@ -26,11 +28,6 @@ def section(comparison: LevelComparison | Refusal) -> Section:
         return Section("raim", "RAIM", paragraphs=(f"Not judged: {comparison}.",))
     raim = comparison.raim
     epochs = len(comparison.levels)
-    source = (
-        "computed here from the ranges of each fix"
-        if raim.source == "ranges"
-        else "as the receiver reported it"
-    )
     alarm: tuple[Callout, ...] = ()
     if raim.detected:
         alarm = (
@@ -52,7 +49,8 @@ def section(comparison: LevelComparison | Refusal) -> Section:
             "HERL and HPL over time, HDOP below.",
             "HERL is the effect of the smallest range error that the test finds with its stated "
             "probability: it is not a bound, and its place above or below the HPL is no ranking. "
-            "Gaps are epochs at which RAIM is not available.",
+            "Gaps are epochs at which RAIM is not available; at bars at the head HERL is infinite, "
+            "for a fault of one satellite would not show.",
             wide=True,
         ),
         drawn(
@@ -76,17 +74,55 @@ def section(comparison: LevelComparison | Refusal) -> Section:
         "raim",
         "RAIM",
         callouts=alarm,
-        paragraphs=(f"RAIM is {source}. {comparison.statement()}",),
-        tables=(_verdicts(comparison), _levels(comparison), _both(comparison)),
+        paragraphs=(f"RAIM is {_made(comparison)}. {comparison.statement()}",),
+        tables=(
+            _verdicts(comparison),
+            _levels(comparison),
+            _both(comparison),
+            *([_findings(comparison)] if raim.findings else []),
+        ),
         pictures=pictures,
     )
 
 
+def _made(comparison: LevelComparison) -> str:
+    """Who made the verdicts and levels, and with which settings where they are known."""
+    raim = comparison.raim
+    words = SOURCE_WORDS[raim.source]
+    if raim.design is None:
+        return words
+    design = raim.design
+    words += (
+        f" (false alarm {design.false_alarm:g} per epoch and {design.outlier_alarm:g} per range, "
+        f"missed detection {design.missed_detection:g}"
+    )
+    if raim.sigma is not None:
+        words += f", sigma {raim.sigma} m"
+    if raim.elevation_mask_deg is not None:
+        words += f", elevation mask {raim.elevation_mask_deg:g} deg"
+    return words + ")"
+
+
+def _findings(comparison: LevelComparison) -> Table:
+    """What was found in the ranges, as the report's own findings have it."""
+    return table(
+        "Findings of RAIM",
+        "Code|Severity|Finding|Evidence|Cure",
+        [
+            (
+                f.code, Cell(f.severity, _TONES[f.severity]), f.message,
+                "; ".join(part for part in (f.where, f.evidence) if part), f.cure,
+            )
+            for f in comparison.raim.findings
+        ],
+    )  # fmt: skip
+
+
 def _verdicts(comparison: LevelComparison) -> Table:
     raim = comparison.raim
-    epochs = max(len(comparison.levels), 1)
+    epochs = len(comparison.levels)
     rows: list[tuple[Cell | str, ...]] = [
-        (verdict.words, count(n), share(n / epochs))
+        (verdict.words, count(n), share(n / max(epochs, 1)))
         for verdict in Verdict
         if (n := raim.count(verdict))
     ]
@@ -98,6 +134,8 @@ def _verdicts(comparison: LevelComparison) -> Table:
         "Only the two that passed are available. An epoch that cannot be tested is not available, "
         "never passed.",
         *([f"Reasons: {reasons}."] if reasons else []),
+        f"Vertically RAIM is available at {count(raim.available_vertical)} of {count(epochs)} "
+        "epochs: there a fault of one satellite must show in the height as well.",
     )
 
 
@@ -107,32 +145,37 @@ def _levels(comparison: LevelComparison) -> Table:
         if name not in comparison.levels.columns:
             continue
         values = comparison.levels[name].to_numpy()
-        values = values[np.isfinite(values)]
-        sizes = (
-            tuple(metres(float(np.quantile(values, q))) for q in (0.5, 0.95, 1.0))
-            if values.size
-            else ("none",) * 3
-        )
+        spread = spread_of(values)
+        sizes = [_size(level_quantile(values, q)) for q in (0.5, 0.95, 1.0)]
         ratio = comparison.ratio(name)
         larger = "" if name == "hpl_m" else share(float((ratio > 1).mean())) if ratio.size else "-"
-        rows.append((words, count(values.size), *sizes, larger))
+        rows.append((words, count(spread["epochs"]), count(spread["infinite"]), *sizes, larger))
     return table(
         "Levels on the same epochs",
-        "Level|#Epochs|#Median [m]|#95 % [m]|#Largest [m]|#Larger than the HPL",
+        "Level|#Epochs|#Infinite|#Median [m]|#95 % [m]|#Largest [m]|#Larger than the HPL",
         rows,
-        "Ratios are of epochs at which RAIM is available and both levels exist.",
+        "Infinite levels count in median, 95 % and largest; of RAIM they are those of epochs at "
+        "which a fault would not show, so that it is not available. Ratios are of epochs at which "
+        "RAIM is available and both levels are finite and above 0.",
     )
+
+
+def _size(level_m: float) -> str:
+    if math.isnan(level_m):
+        return "none"
+    return "infinite" if math.isinf(level_m) else metres(level_m)
 
 
 def _both(comparison: LevelComparison) -> Table:
     limit = comparison.alert_limit_m
-    words = "a level" if limit is None else f"a level below {limit:g} m"
+    words = "an HPL" if limit is None else f"an HPL below {limit:g} m"
     cells = comparison.both
     return table(
-        f"Availability of both: {words}",
+        f"SBAS with {words}, and RAIM",
         "|#RAIM no|#RAIM yes",
         [
             ("SBAS no", count(int(cells[0, 0])), count(int(cells[0, 1]))),
             ("SBAS yes", count(int(cells[1, 0])), count(int(cells[1, 1]))),
         ],
+        f"RAIM counts where {comparison.raim_words}.",
     )

@@ -44,7 +44,7 @@ def recording(
 
 
 def found(source: Recording, **options: Any) -> RecordedErrors:
-    given_options: dict[str, Any] = {"truth": TRUTH, "--azimuth": 90.0, "thresholds": LIMIT}
+    given_options: dict[str, Any] = {"truth": TRUTH, "azimuth_deg": 90.0, "thresholds": LIMIT}
     return along_track_errors(source, **{**given_options, **options})
 
 
@@ -148,7 +148,7 @@ def test_without_truth_or_direction_there_is_no_sign() -> None:
     assert "--azimuth" in caught.value.cure
     with pytest.raises(InputError, match="two directions"):
         found(source, direction_above_mps=1.0)
-    with pytest.raises(InputError, match="no number"):
+    with pytest.raises(InputError, match="between -360 and 360"):
         found(source, azimuth_deg=np.nan)
     with pytest.raises(InputError, match="judge by"):
         found(source, judged_by="vertical")
