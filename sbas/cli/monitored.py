@@ -33,6 +33,7 @@ class RangeFiles:
     geo: int | None
     mode: Literal["pa", "npa"] | None
     position: str | None
+    systems: Literal["G", "E", "GE"] | None
 
     def refuse(self) -> None:
         """Raise InputError where one was given beside a recording."""
@@ -56,7 +57,15 @@ class RangeFiles:
         place = place_of(self.position)
         if not self.messages:
             refuse_alone(False, "--messages", geo=self.geo, mode=self.mode)
-            return unaugmented(self.obs, self.nav, place_m=place, elevation_mask_deg=mask_deg)
+            return unaugmented(
+                self.obs, self.nav, systems=self.systems or "G", place_m=place,
+                elevation_mask_deg=mask_deg,
+            )  # fmt: skip
+        if self.systems not in (None, "G"):
+            raise InputError(
+                "SBAS messages correct GPS alone", where=f"--systems {self.systems}",
+                cure="leave out --messages, or --systems",
+            )  # fmt: skip
         if self.geo is None:
             raise InputError("--messages need the SBAS satellite", cure="--geo PRN")
         return protect(

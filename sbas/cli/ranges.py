@@ -198,6 +198,10 @@ def raim_files(
         str | None,
         typer.Option(metavar="X,Y,Z", help="Known antenna position, earth-fixed, in metres."),
     ] = None,
+    systems: Annotated[
+        Literal["G", "E", "GE"] | None,
+        typer.Option(help="Without messages: GPS (G, the default), Galileo (E), or both."),
+    ] = None,
     false_alarm: Annotated[
         float | None, typer.Option(help="Of the overall test, per epoch, else 1e-3.")
     ] = None,
@@ -250,7 +254,7 @@ def raim_files(
     from sbas.monitoring import raim, with_raim_flags
     from sbas.monitoring.recording_monitor import takes_ranges
 
-    ranges = RangeFiles(obs, nav, messages, geo, mode, position)
+    ranges = RangeFiles(obs, nav, messages, geo, mode, position, systems)
     check_mask(elevation)
     refuse_alone(araim, "--araim", prior_satellite=prior_satellite,
                   prior_constellation=prior_constellation)  # fmt: skip

@@ -86,7 +86,7 @@ def unaugmented_ranges(
             raise InputError(
                 f"the observations have no {_CODE_NAMES[system]}",
                 evidence=f"systems {', '.join(observed.systems) or 'none'}",
-                cure="log it, or give systems that the file has",
+                cure="log it, or give systems that the file has (--systems E, or GE)",
             )
         parts.append(measurements(own, smoothing=smoothing))
     measured = parts[0] if len(parts) == 1 else joined(*parts)

@@ -243,3 +243,21 @@ def test_a_recording_without_epochs_is_no_answer(
     answer = Answer(capsys, "raim", out)
     assert answer.code == 2
     assert "E15" in answer.out
+
+
+def test_galileo_alone_is_monitored_and_messages_are_for_gps(
+    arguments: tuple[object, ...], reference_data: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = reference_data / "data/rinex"
+    galileo = (
+        "raim", "--obs", folder / "CEDA00USA_R_20182100000_23H_15S_MO.rnx.gz", "--nav",
+        folder / "ELKO00USA_R_20182100000_01D_MN.rnx.gz",
+    )  # fmt: skip
+    found = Answer(capsys, *galileo, "--systems", "E", "--json").json
+    # Time tags of this file are wrong: every epoch that can be tested shows it.
+    assert found["detected"] == found["verdicts"]["detected"] == 155
+    assert found["available"] == 0
+    assert found["ranges_corrected_by_sbas"] is False
+    corrected = Answer(capsys, "raim", *arguments, "--systems", "GE")
+    assert corrected.code == 2
+    assert "GPS alone" in corrected.err
