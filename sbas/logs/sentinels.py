@@ -3,6 +3,7 @@ and longitudes that run to 360 degrees."""
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 
 import numpy as np
@@ -12,6 +13,7 @@ from sbas.findings import Finding
 from sbas.recording import Flag
 
 _DOP = ("hdop", "vdop", "pdop")
+_SAFETY_COLUMNS = ("hpl_m", "vpl_m", "lat_deg", "lon_deg", "height_m")
 _COUNTS = ("n_sv", "n_sv_tracked", "geo_prn")
 _METRES = ("hpl_m", "vpl_m", "herl_m", "verl_m", "sigma_e_m", "sigma_n_m", "sigma_u_m",
            "correction_age_s")  # fmt: skip
@@ -76,6 +78,35 @@ def sentinel_findings(counts: Mapping[str, Mapping[str, int]]) -> tuple[Finding,
             "values that stand for 'missing' were made missing; a missing protection level is "
             "unavailable, it is not counted as below the alert limit",
             evidence="; ".join(shown),
+        ),
+    )
+
+
+def removed_findings(removed: Mapping[tuple[str, str], int]) -> tuple[Finding, ...]:
+    """E07 of a receiver's own marks: a warning for positions and protection levels, for the rest
+    only information.
+
+    Parameters
+    ----------
+    removed : values made missing, by column and value.
+    """
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    for (column, value), number in sorted(removed.items()):
+        counts[column][value] += number
+    grave = {name: counts.pop(name) for name in _SAFETY_COLUMNS if name in counts}
+    if not counts:
+        return sentinel_findings(grave)
+    return (
+        *sentinel_findings(grave),
+        Finding(
+            "E07",
+            "info",
+            "values that the receiver marked as not available were made missing",
+            evidence="; ".join(
+                f"{name}: {number:,} x {value}"
+                for name, values in counts.items()
+                for value, number in values.items()
+            ),
         ),
     )
 

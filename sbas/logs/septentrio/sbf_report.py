@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sbas.findings import Finding, Severity
-from sbas.logs.sentinels import sentinel_findings
+from sbas.logs.sentinels import removed_findings
 from sbas.logs.septentrio import sbf_blocks as sbf
 from sbas.logs.septentrio.sbf_decode import Removed
 from sbas.logs.septentrio.sbf_epochs import gps_times
@@ -29,7 +29,6 @@ from sbas.recording import ProtectionLevelMeta, RecordingMeta
 BAD_SHARE = 0.01
 """Share of orphan bytes above which a file counts as damaged rather than scratched."""
 
-_SAFETY_COLUMNS = ("hpl_m", "vpl_m", "lat_deg", "lon_deg", "height_m")
 _LEAP_MISSING = -128
 _SYNCHRONISED = 7
 _DATUM_WGS84 = 0
@@ -159,7 +158,7 @@ def protection_level_meta(levels: Levels | None) -> ProtectionLevelMeta:
 
 def findings(seen: Seen) -> tuple[Finding, ...]:
     """Findings on the blocks that were read."""
-    found = [*_removed(seen.removed)]
+    found = [*removed_findings(seen.removed)]
     if seen.without_time:
         found.append(
             Finding(
@@ -213,29 +212,6 @@ def findings(seen: Seen) -> tuple[Finding, ...]:
     if seen.levels is not None:
         found += _levels(seen.levels)
     return (*found, *_clock(seen.clock))
-
-
-def _removed(removed: Removed) -> list[Finding]:
-    """E07: a warning for positions and protection levels, for the rest only information."""
-    counts: dict[str, Counter[str]] = defaultdict(Counter)
-    for (column, value), number in sorted(removed.items()):
-        counts[column][value] += number
-    grave = {name: counts.pop(name) for name in _SAFETY_COLUMNS if name in counts}
-    found = list(sentinel_findings(grave))
-    if counts:
-        found.append(
-            Finding(
-                "E07",
-                "info",
-                "values that the receiver marked as not available were made missing",
-                evidence="; ".join(
-                    f"{name}: {number:,} x {value}"
-                    for name, values in counts.items()
-                    for value, number in values.items()
-                ),
-            )
-        )
-    return found
 
 
 def _levels(levels: Levels) -> list[Finding]:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 
 from sbas.findings import Finding
-from sbas.logs.sentinels import sentinel_findings
-from sbas.logs.septentrio.sbf_decode import Removed
+from sbas.logs.sentinels import removed_findings
 from sbas.logs.ublox.ubx_levels import LevelCounts
 from sbas.logs.ublox.ubx_stream import Seen
 from sbas.recording import ProtectionLevelMeta, RecordingMeta
 
-_SAFETY_COLUMNS = ("hpl_m", "vpl_m", "lat_deg", "lon_deg", "height_m")
 _FRAME_AGE_MS = 2000
 """Frames come once a second: epochs further apart say little about when a frame came."""
 
@@ -43,7 +41,7 @@ def _listed(counts: Counter[str]) -> str:
 
 def _of_messages(seen: Seen) -> list[Finding]:
     tally = seen.tally
-    found = _of_removed(tally.removed)
+    found = list(removed_findings(tally.removed))
     if tally.without_time:
         found.append(
             Finding(
@@ -81,29 +79,6 @@ def _of_messages(seen: Seen) -> list[Finding]:
                 "the positions of this log are in messages that are not read",
                 evidence=_listed(seen.positions_not_read),
                 cure="log NAV-PVT",
-            )
-        )
-    return found
-
-
-def _of_removed(removed: Removed) -> list[Finding]:
-    """E07: a warning for positions and protection levels, for the rest only information."""
-    counts: dict[str, Counter[str]] = defaultdict(Counter)
-    for (column, value), number in sorted(removed.items()):
-        counts[column][value] += number
-    grave = {name: counts.pop(name) for name in _SAFETY_COLUMNS if name in counts}
-    found = list(sentinel_findings(grave))
-    if counts:
-        found.append(
-            Finding(
-                "E07",
-                "info",
-                "values that the receiver marked as not available were made missing",
-                evidence="; ".join(
-                    f"{name}: {number:,} x {value}"
-                    for name, values in counts.items()
-                    for value, number in values.items()
-                ),
             )
         )
     return found
