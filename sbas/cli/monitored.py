@@ -96,7 +96,9 @@ def whole_recording(
         raise InputError(
             "the recording has neither ranges with their sigmas nor a receiver's own RAIM",
             where=", ".join(map(str, files)),
-            evidence="; ".join(f"{f.message}: {f.where}" for f in found if f.code == "E25")
+            evidence="; ".join(
+                f"{f.message}: {f.where}" for f in found if f.message.startswith("side table")
+            )
             or f"columns {', '.join(recording.columns)}",
             cure="SBF with RAIMStatistics, or ranges: sbas protect makes such a recording; "
             "--sigma for ranges without sigmas",

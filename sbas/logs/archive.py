@@ -91,12 +91,23 @@ def _meta(parts: Sequence[_Part]) -> RecordingMeta:
     return replace(
         metas[0],
         sources=tuple(chain.from_iterable(m.sources for m in metas)),
+        options=_shared_options([part.source.meta for part in known]),
         findings=(
             *chain.from_iterable(m.findings for m in metas),
             *_differences(known),
             *_overlaps(known),
         ),
     )
+
+
+def _shared_options(metas: Sequence[RecordingMeta]) -> dict[str, str]:
+    """What was done alike to all parts: what was done to one of them is not true of the whole."""
+    first = metas[0].options
+    return {
+        key: value
+        for key, value in first.items()
+        if all(key in m.options and m.options[key] == value for m in metas)
+    }
 
 
 _SAME = ("receiver", "frame", "height_reference", "antenna")

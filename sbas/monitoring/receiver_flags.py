@@ -108,7 +108,8 @@ def with_raim_flags(recording: Recording, result: RaimResult) -> Recording:
     levels: dict[str, Floats] = {}
     for name in ("herl_m", "verl_m"):
         values = result.epochs[name].to_numpy()
-        levels[name] = np.where(np.isfinite(values), values, np.nan)
+        tested = np.isfinite(values) & (verdict != Verdict.NOT_AVAILABLE)
+        levels[name] = np.where(tested, values, np.nan)
     table = recording.table.assign(flags=(flags & ~_RAIM_BITS) | bits, **levels)
     if result.source == "receiver":
         return recording.replace(table=table)

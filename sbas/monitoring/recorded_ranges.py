@@ -113,7 +113,10 @@ def recorded_ranges(
         )  # fmt: skip
     n = len(recording)
     known = epoch >= 0
-    sound = np.isfinite(elevation + azimuth) & np.isfinite(spread) & (spread > 0)
+    with np.errstate(divide="ignore", over="ignore"):
+        weight = 1 / (spread * spread)
+    # A sigma whose weight is 0 or infinite is none: its range would drop out of the fix.
+    sound = np.isfinite(elevation + azimuth) & (spread > 0) & (weight > 0) & (weight < np.inf)
     sound &= (np.isfinite(residual) & (code >= 0)) | low
     faulty = epoch[known & ~sound & ~low]
     reason[faulty[reason[faulty] == 0]] = MonitorReason.INCOMPLETE

@@ -143,3 +143,18 @@ def test_columns_that_a_file_lacks_are_missing_in_its_rows() -> None:
     assert table["mode"].iloc[:100].isna().all()
     assert table["environment"].isna().tolist() == [True] * 100 + [False] * 100
     assert table["x_note"].isna().tolist() == [True] * 100 + [False] * 100
+
+
+def test_what_was_done_to_one_file_is_not_said_of_all() -> None:
+    early, late = halves()
+    done = {"raim": "sigma 3", "truth": "roof"}
+    first = early.replace(meta=replace(early.meta, options=done))
+    for other, shared in (
+        ({"raim": "sigma 9", "truth": "roof"}, {"truth": "roof"}),
+        ({"truth": "roof"}, {"truth": "roof"}),
+        (done, done),
+        ({}, {}),
+    ):
+        second = late.replace(meta=replace(late.meta, options=other))
+        assert join_sources([first, second]).meta.options == shared
+        assert join_sources([second, first]).meta.options == shared

@@ -162,3 +162,12 @@ def test_settings_of_ranges_are_refused_for_levels_that_were_recorded() -> None:
                      {"track_azimuth_deg": 0.0}, {"risk": 1e-9}):  # fmt: skip
         with pytest.raises(InputError, match="change nothing"):
             raim(recording, **settings)  # type: ignore[arg-type]
+
+
+def test_levels_of_untested_epochs_are_not_written() -> None:
+    recording = noisy(3, 8, 10)
+    side = recording.side_tables[SIDE_TABLE].drop(columns="residual_m")
+    untested = raim(recording.replace(side_tables={SIDE_TABLE: side}))
+    assert np.isfinite(untested.epochs["herl_m"]).all()
+    written = with_raim_flags(recording, untested).table
+    assert written[["herl_m", "verl_m"]].isna().all(axis=None)

@@ -206,3 +206,13 @@ def test_cures_name_the_argument() -> None:
 def test_variances_for_sigmas_are_noticed() -> None:
     found = recorded_ranges(noisy(1, 6, 2), sigma=400.0)
     assert [f.code for f in found.findings] == ["E08"]
+
+
+@pytest.mark.parametrize("sigma_m", [1e-200, 1e200])
+def test_a_sigma_without_a_weight_leaves_its_fix_incomplete(sigma_m: float) -> None:
+    recording = noisy(3, 8, 5)
+    side = recording.side_tables[SIDE_TABLE].copy()
+    at = (side["satellite"] == "G03") & (side["time"] == recording.time[2])
+    side.loc[at, "sigma_m"] = sigma_m
+    found = recorded_ranges(recording.replace(side_tables={SIDE_TABLE: side}))
+    assert (found.reason == MonitorReason.INCOMPLETE).tolist() == [False, False, True, False, False]
