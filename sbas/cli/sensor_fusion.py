@@ -87,7 +87,9 @@ def multisensor_files(
         opened = inputs.open_recording(
             recording, truth, reading, repairing, quiet=quiet, whole=True
         )
-    elif (azimuth, direction_above, receiver) != (None,) * 3 or truth != inputs.TruthGiven():
+    elif (azimuth, direction_above, receiver, accept) != (
+        None,
+    ) * 4 or truth != inputs.TruthGiven():
         raise InputError(
             "a truth, track or direction without a recording",
             cure="--recording FILE --truth LAT,LON,H --azimuth DEGREES",
@@ -135,12 +137,15 @@ def _check_outputs(tree: Path | None, report: Path | None, given: list[Path | st
     for out in (tree, report):
         if out is not None:
             inputs.refuse_to_overwrite(out, given)
+            if not out.absolute().parent.is_dir():
+                raise InputError("no such folder to write to", where=str(out),
+                                 cure="name a file in a folder that exists")  # fmt: skip
     if tree is not None and tree.suffix != ".json":
         raise InputError(
             "sbas depend knows a fault tree by its ending", where=f"--tree {tree}",
             cure=f"--tree {tree.with_suffix('.json')}",
         )  # fmt: skip
-    if tree is not None and tree == report:
+    if tree is not None and report is not None and tree.resolve() == report.resolve():
         raise InputError("fault tree and report in one file", where=str(tree),
                          cure="name two files")  # fmt: skip
 

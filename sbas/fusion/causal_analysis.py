@@ -318,6 +318,14 @@ def multisensor(
         )  # fmt: skip
         sources[name] = resampled
         findings += [*recorded.findings, *resampled.findings]
+        if recorded.labels and resampling == "replay":
+            findings.append(
+                Finding(
+                    "E28", "info", "environments do not part a replay: its windows cross them",
+                    evidence=", ".join(recorded.labels),
+                    cure='"block_bootstrap" keeps each run within one environment',
+                )
+            )  # fmt: skip
     refuse_unmodelled(architecture, supplied=sources)
     fused = simulate_runs(architecture, runs=runs, seed=seed, sources=sources, progress=progress)
     critical = critical_times(
@@ -377,7 +385,8 @@ def _weights_of_recording(fused: FusedRuns) -> Finding:
     return Finding(
         "E28", "info",
         "the recorded receiver's variance, its faults included, sets the weights of the fusion",
-        evidence=", ".join(f"{n} {w:.3f}" for n, w in zip(fused.names, mean, strict=True)),
+        evidence=", ".join(f"{n} {w:.3f}" for n, w in zip(fused.names, mean, strict=True))
+        + ("" if fused.weights.shape[:-1] == (1,) else " (means over axes and epochs)"),
         cure='weights = "fixed" keeps those of another design',
     )  # fmt: skip
 

@@ -283,3 +283,20 @@ def test_what_belongs_to_a_recording_is_refused_without_one(
 
 def test_help_names_an_example(capsys: Capture) -> None:
     assert "Example:" in Answer(capsys, "multisensor", "--help").out
+
+
+def test_what_cannot_be_written_is_refused_before_the_simulation(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    for option, name in (("--tree", "t.json"), ("--report", "r.html")):
+        lost = Answer(capsys, "multisensor", "arch1", *FEW, option, tmp_path / "no" / name)
+        assert lost.code == 2
+        assert "no such folder" in lost.err
+    (tmp_path / "a").mkdir()
+    same = Answer(
+        capsys, "multisensor", "arch1", *FEW, "--tree", tmp_path / "a" / ".." / "t.json",
+        "--report", tmp_path / "t.json",
+    )  # fmt: skip
+    assert same.code == 2
+    assert "one file" in same.err
+    assert Answer(capsys, "multisensor", "arch1", *FEW, "--accept", "E12").code == 2

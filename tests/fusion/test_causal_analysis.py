@@ -11,6 +11,7 @@ from typing import Any
 
 import mpmath  # type: ignore[import-untyped]
 import numpy as np
+import pandas as pd
 import pytest
 
 import sbas
@@ -441,3 +442,12 @@ def test_errors_of_a_recording_may_be_accepted_by_name() -> None:
     answer = of_laboratory(truth=far, accept_findings=["E12"])
     assert answer.recorded is not None
     assert answer.recorded.counts.hazard + answer.recorded.counts.detected > 1000
+
+
+def test_labels_do_not_part_a_replay_and_that_is_said() -> None:
+    usual = laboratory()
+    labels = pd.Categorical(["open"] * 500 + ["cutting"] * (len(usual) - 500))
+    labelled = usual.replace(table=usual.table.assign(environment=labels))
+    told = [f for f in of_laboratory(recording=labelled).findings if "environments" in f.message]
+    assert [(f.code, set(f.evidence.split(", "))) for f in told] == [("E28", {"open", "cutting"})]
+    assert not [f for f in of_laboratory().findings if "environments" in f.message]

@@ -15,6 +15,7 @@ from sbas.fusion.critical.competing_risks import (
 )
 from sbas.fusion.critical.episodes import OUTPUTS, REACHED, Episodes
 from sbas.fusion.critical.run_bootstrap import (
+    ENOUGH_RUNS,
     FEW_RUNS,
     Counts,
     RunSums,
@@ -82,9 +83,10 @@ def figures_of(
     outputs = list(range(len(OUTPUTS)))
     row: dict[str, Any] = {"epochs": int(sums.drawn[outputs, 0].sum())}
     for place_of, state in enumerate(OUTPUTS):
-        row |= _share(_SHARES[state], sums, [place_of], outputs)
+        row |= _share(_SHARES[state], sums, [place_of], outputs, few=ENOUGH_RUNS)
     row["episodes"] = int(sums.drawn[_COUNTED, 0])
-    row |= _share(f"p_{found.target.lower()}_at_entry", sums, [_THERE], [_COUNTED])
+    at_entry = f"p_{found.target.lower()}_at_entry"
+    row |= _share(at_entry, sums, [_THERE], [_COUNTED], few=ENOUGH_RUNS)
     row["at_risk"], row["events"] = at_risk.size, int(sums.drawn[events, 0].sum())
     row |= _share("incidence", sums, events, outcomes)
     for horizon_s in HORIZONS_S:
@@ -101,8 +103,7 @@ def figures_of(
     if row["events"] < FEW_EVENTS:
         return row, None
     lower, upper = percentile_bounds(incidence[:, 1:])
-    at_entry = row[f"p_{found.target.lower()}_at_entry"]
-    return row, IncidenceCurve(time_s, incidence[:, 0], lower, upper, at_entry)
+    return row, IncidenceCurve(time_s, incidence[:, 0], lower, upper, row[at_entry])
 
 
 def _times(
@@ -121,7 +122,8 @@ def _times(
     runs_with_event = np.count_nonzero(sums.part_and_whole(events, [_COUNTED])[0])
     row: dict[str, float] = {}
     for key, replicates in of_event.items():
-        row |= _timed(key, replicates, value=estimable, bounds=bool(runs_with_event >= FEW_RUNS))
+        few = ENOUGH_RUNS if key == "event_mean_s" else FEW_RUNS
+        row |= _timed(key, replicates, value=estimable, bounds=bool(runs_with_event >= few))
 
     counted = sums.drawn[_COUNTED]
     at_entry = np.divide(
@@ -145,19 +147,25 @@ def _timed(key: str, replicates: Floats, *, value: bool, bounds: bool) -> dict[s
     }
 
 
-def _share(key: str, sums: RunSums, part: list[int], whole: list[int]) -> dict[str, float]:
+def _share(
+    key: str, sums: RunSums, part: list[int], whole: list[int], *, few: int = FEW_RUNS
+) -> dict[str, float]:
     """One sum over another, NaN where there is nothing to be a part of."""
     of, total = sums.drawn[part].sum(axis=0), sums.drawn[whole].sum(axis=0)
     share = np.divide(of, total, out=np.full(total.shape, np.nan), where=total > 0)
-    return _bounded(key, share, sums.part_and_whole(part, whole))
+    return _bounded(key, share, sums.part_and_whole(part, whole), few=few)
 
 
 def _bounded(
-    key: str, replicates: Floats | None, part_and_whole: tuple[Ints, Ints]
+    key: str,
+    replicates: Floats | None,
+    part_and_whole: tuple[Ints, Ints],
+    *,
+    few: int = FEW_RUNS,
 ) -> dict[str, float]:
     if replicates is None:
         return dict.fromkeys((key, f"{key}_lower", f"{key}_upper"), np.nan)
-    lower, upper = share_bounds(*part_and_whole, replicates[1:])
+    lower, upper = share_bounds(*part_and_whole, replicates[1:], few=few)
     value = float(replicates[0])
     # Exact bounds do not know of records that ended: the value may lie beyond them.
     return {key: value, f"{key}_lower": min(lower, value), f"{key}_upper": max(upper, value)}

@@ -18,6 +18,8 @@ Counts = NDArray[np.uint16]
 
 FEW_RUNS = 5
 """What fewer runs show has no interval by drawing runs again: it would be far too narrow."""
+ENOUGH_RUNS = 20
+"""For shares of epochs, of which one run has many, and for mean times, 5 runs are still too few."""
 TAIL = 0.025
 """Of each side of the intervals, which are at 95 %."""
 _STREAM = 8_127_051
@@ -111,18 +113,21 @@ def percentile_bounds(replicates: Floats) -> tuple[Floats, Floats]:
     return lower, upper
 
 
-def share_bounds(part: Ints, whole: Ints, replicates: Floats) -> tuple[float, float]:
+def share_bounds(
+    part: Ints, whole: Ints, replicates: Floats, *, few: int = FEW_RUNS
+) -> tuple[float, float]:
     """Interval at 95 % of a share, by drawing runs again where enough runs show it.
 
     Parameters
     ----------
     part, whole : (runs concerned) count of each run, and out of how many.
     replicates : (replicates,) the share in each sample drawn.
+    few : runs with the part, and with the rest, that a bound by drawing needs.
 
     Returns
     -------
-    Lower and upper bound. Percentiles of the replicates; where fewer than 5 runs have any of the
-    part, or fewer than 5 any of the rest, exact binomial bounds on the wide side: runs, each
+    Lower and upper bound. Percentiles of the replicates; where fewer than `few` runs have any of
+    the part, or fewer any of the rest, exact binomial bounds on the wide side: runs, each
     counted once, are the trials of the bound away from 0 (from 1), all cases those of the other.
 
     References
@@ -135,9 +140,9 @@ def share_bounds(part: Ints, whole: Ints, replicates: Floats) -> tuple[float, fl
         return np.nan, np.nan
     with_part, with_rest = int(np.count_nonzero(part)), int(np.count_nonzero(whole - part))
     bounds = []
-    if with_part < FEW_RUNS:
+    if with_part < few:
         bounds.append((_exact_lower(with_part, cases), _exact_upper(with_part, runs)))
-    if with_rest < FEW_RUNS:
+    if with_rest < few:
         bounds.append((1 - _exact_upper(with_rest, runs), 1 - _exact_lower(with_rest, cases)))
     if not bounds:
         lower, upper = percentile_bounds(replicates)

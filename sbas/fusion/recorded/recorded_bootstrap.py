@@ -142,7 +142,8 @@ def replayed(
             f"no stretch{within} is as long as a run",
             evidence=f"a run takes {window * grid.interval_s:g} s, the longest stretch "
             f"{longest_stretch(grid, environment) * grid.interval_s:g} s",
-            cure="shorter runs, --resampling block_bootstrap, or a longer recording",
+            cure="shorter runs, --resampling block_bootstrap, or a longer recording; where a "
+            "stretch has 0 s, no epoch has a direction of travel: --direction-above, --azimuth",
         )
     return _source("replay", grid, step_s, offsets, window, (environment or "",), (starts,))
 
@@ -241,7 +242,7 @@ def _tau_s(grid: RecordedGrid) -> float:
     raise InputError(
         "the decorrelation time of the errors is not known: no block length follows",
         evidence=reasons[0],
-        cure="--resampling replay, or a longer recording",
+        cure="--resampling replay, which needs none; or another recording",
     )
 
 

@@ -25,6 +25,7 @@ FALSE_ALARM: Final = 1e-3
 
 _T_LIMIT: Final = float(-special.ndtri(FALSE_ALARM / 2))
 _WEAK: Final = 0.5
+_STANDS_STILL: Final = 1e-9
 _LARGEST: Final = 1e150
 """Stands for an infinite error: its normalised residuals stay finite and keep their order."""
 
@@ -148,8 +149,9 @@ def correlation_test(
     Returns
     -------
     Disagreement: usable where a sensor is left that is not flagged. Where all are flagged none
-    is dropped. Nothing is flagged before the first full window, nor where a correlation is
-    undefined.
+    is dropped. Nothing is flagged before the first full window. An undefined correlation, as with
+    a signal that stands still, is passed over: the defined ones decide, and without any nothing
+    is flagged.
 
     Raises
     ------
@@ -211,6 +213,9 @@ def _weakly_correlated(signal: Floats, window: int, options: Correlation) -> Boo
         centred = part - mean
         covariance += centred[:, np.newaxis] * centred
     sd = np.sqrt(np.einsum("iitr->itr", covariance))
+    # A signal that stands still has no correlation: what is left of it is rounding.
+    size = np.max(np.abs(signal), initial=0.0, where=~np.isnan(signal))
+    sd[sd <= _STANDS_STILL * (1.0 + size) * np.sqrt(window)] = np.nan
     with np.errstate(invalid="ignore", divide="ignore"):
         r = covariance / (sd[:, np.newaxis] * sd)
     own = np.eye(sensors, dtype=bool)[:, :, np.newaxis, np.newaxis]

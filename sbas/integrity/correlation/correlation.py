@@ -219,6 +219,12 @@ def _estimate(
             "pairs of epochs are known",
             "record longer",
         )
+    if interval is not None and interval.value_s is None and recorded_s >= LEAST_LENGTHS * robust:
+        return Refusal(
+            f"the correlation fades within {robust:.4g} s, yet no Gauss-Markov record of this "
+            "length looks like this one: bursts among the errors may be the cause",
+            "look at the curve; a longer record need not help",
+        )
     if misfit == "record_too_short" or interval is None or interval.value_s is None:
         return Refusal(
             f"{recorded_s:.6g} s are fewer than {LEAST_LENGTHS} decorrelation times",

@@ -203,3 +203,17 @@ def test_flag_rates_of_the_page(
         low, high = expected
         assert min(rates) == pytest.approx(low, abs=0.2 * low + 0.001), state
         assert max(rates) == pytest.approx(high, abs=0.2 * high + 0.001), state
+
+
+def test_a_held_position_has_no_correlation() -> None:
+    rng = np.random.default_rng(4)
+    t, runs = np.arange(40.0), 30
+    truth = 5.0 * t
+    moving = rng.normal(size=(2, t.size, runs)).cumsum(axis=1)
+    # Held from the tenth epoch on its position is one number: what varies of it is rounding.
+    held = np.where(t < 10, 0.0, 45.1 - truth)[:, None] + np.zeros((t.size, runs))
+    together = correlation_test(_track(np.stack([*moving, held])), truth, step_s=1.0)
+    alone = correlation_test(_track(moving), truth, step_s=1.0)
+    late = slice(20, None)
+    assert not together.excluded[2, :, late].any()
+    assert (together.excluded[:2, :, late] == alone.excluded[:, :, late]).all()
