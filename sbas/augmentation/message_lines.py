@@ -111,7 +111,7 @@ def calendar_s(columns: Sequence[Sequence[bytes]]) -> tuple[Ints, Bools]:
     full = np.where(year < 80, 2000, 1900) + year
     months = ((full - 1970) * 12 + month - 1).astype("M8[M]")
     first = months.astype("M8[D]").astype(np.int64)
-    length = (months + 1).astype("M8[D]").astype(np.int64) - first
+    length = (months + np.timedelta64(1, "M")).astype("M8[D]").astype(np.int64) - first
     exists = (month >= 1) & (month <= 12) & (day >= 1) & (day <= length)
     exists &= (hour < 24) & (minute < 60) & (second < 60)
     of_day = hour * 3600 + minute * 60 + second

@@ -46,7 +46,7 @@ def decimal_year(time: ArrayLike) -> Floats:
     """(n,) times as decimal years, by the length of each calendar year."""
     at = np.asarray(time, "M8[ns]")
     year = at.astype("M8[Y]")
-    begin, end = year.astype("M8[ns]"), (year + 1).astype("M8[ns]")
+    begin, end = year.astype("M8[ns]"), (year + np.timedelta64(1, "Y")).astype("M8[ns]")
     share = (at - begin).astype(float) / (end - begin).astype(float)
     return np.asarray(year.astype(int) + 1970 + share, dtype=float)
 
