@@ -104,7 +104,8 @@ def _stamps_2(text: str) -> NDArray[np.datetime64]:
             start = np.datetime64(whole, "ns")
         except ValueError:
             continue
-        times.append(start + int(seconds) * NS_PER_S + int(fraction) * 100)
+        nanoseconds = int(seconds) * NS_PER_S + int(fraction) * 100
+        times.append(start + np.timedelta64(nanoseconds, "ns"))
     return np.array(times, "M8[ns]")
 
 

@@ -93,7 +93,7 @@ def test_neighbours_share_the_line_without_overlap_or_rest(
         ((TrackSegment(10, 0, "a"),), "ends at or before"),
         ((TrackSegment(0, float("nan"), "a"),), "ends at or before"),
         ((TimeSegment(at("07:00"), at("06:00"), "a"),), "ends at or before"),
-        ((TimeSegment(at("07:00"), np.datetime64("NaT"), "a"),), "ends at or before"),
+        ((TimeSegment(at("07:00"), np.datetime64("NaT", "ns"), "a"),), "ends at or before"),
         ((TrackSegment(0, 10, ""),), "no label"),
         ((TrackSegment(0, 10, " open"),), "no label"),
         ((TrackSegment(0, 10, "unlabelled"),), "no label"),

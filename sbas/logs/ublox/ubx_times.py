@@ -65,7 +65,7 @@ def gps_times(time_ms: Times) -> NDArray[np.datetime64]:
     """GPS time of (n,) milliseconds since 1980-01-06; NaT for -1."""
     times: NDArray[np.datetime64] = (time_ms * 1_000_000 + GPS_EPOCH_NS).view("M8[ns]")
     if len(times) and time_ms.min() < 0:
-        times[time_ms < 0] = np.datetime64("NaT")
+        times[time_ms < 0] = np.datetime64("NaT", "ns")
     return times
 
 

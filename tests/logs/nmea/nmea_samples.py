@@ -56,7 +56,7 @@ def log(epochs: int, *, seed: int = 1, start_s: float = 86_000.0, step_s: float 
     entries = []
     for i in range(epochs):
         days, tod_s = divmod(start_s + i * step_s, 86_400)
-        date = np.datetime64(day) + int(days)
+        date = np.datetime64(day) + np.timedelta64(int(days), "D")
         year, month, day_of_month = str(date).split("-")
         time = clock(tod_s, 2)
         lat, lon = 50.0345 + 1e-5 * i, -15.7712 + 1e-5 * float(rng.normal())
